@@ -1,0 +1,28 @@
+//! A physical face rig from one neutral mesh.
+//!
+//! The folders are the map; data flows one way through them:
+//!
+//! ```text
+//! mesh -> template -> registration -> anatomy -> transfer -> skin -> rig -> scene -> recording
+//!                                                         facs, motion ----^
+//!                                                    cloth, collision -----^
+//! ```
+//!
+//! # Units and axes
+//!
+//! Millimetres at true head size, seconds, +Y up, +Z out of the face, the character's left
+//! is +X, unless an item says otherwise (a user's own mesh keeps its own units).
+//!
+//! # Source
+//!
+//! Zhu & Joslin, *Fabrig: A Cloth-Simulated Transferable 3D Face Parameterization*,
+//! SIGGRAPH Asia 2024. Equation numbers in the documentation are that paper's.
+
+pub mod anatomy;
+pub mod mesh;
+pub mod template;
+
+/// A position, double precision. [mm] unless stated.
+pub type Point = nalgebra::Point3<f64>;
+/// A displacement or direction, double precision. [mm] unless stated.
+pub type Vector = nalgebra::Vector3<f64>;
