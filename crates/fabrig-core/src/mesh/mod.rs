@@ -1,5 +1,15 @@
 //! Polygon meshes: storage with validated topology, derived geometry, files.
 
+mod components;
+mod laplacian;
+mod normals;
 mod polygon_mesh;
+mod surface;
+mod topology;
 
+pub use components::Components;
+pub use laplacian::{EdgeLaplacian, vertex_areas};
+pub use normals::{triangle_normals, vertex_normals};
 pub use polygon_mesh::{CornerUvs, FaceGroup, Mesh, MeshError, Polygons};
+pub use surface::{RayHit, Surface, SurfaceError, SurfacePoint, closest_on_triangle};
+pub use topology::{Edge, Topology};
