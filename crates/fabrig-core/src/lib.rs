@@ -19,6 +19,7 @@
 //! SIGGRAPH Asia 2024. Equation numbers in the documentation are that paper's.
 
 pub mod anatomy;
+pub mod atomic_file;
 pub mod mesh;
 pub mod template;
 

@@ -1,6 +1,7 @@
 //! Polygon meshes: storage with validated topology, derived geometry, files.
 
 mod components;
+pub mod io;
 mod laplacian;
 mod normals;
 mod polygon_mesh;
