@@ -21,6 +21,8 @@
 pub mod anatomy;
 pub mod atomic_file;
 pub mod mesh;
+#[cfg(feature = "render")]
+pub mod render;
 pub mod template;
 
 /// A position, double precision. [mm] unless stated.

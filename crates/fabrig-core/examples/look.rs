@@ -1,0 +1,97 @@
+//! Looks at a mesh: renders an OBJ file to a PNG.
+//!
+//! ```text
+//! cargo run --release -p fabrig-core --features render --example look -- MESH.obj OUT.png \
+//!     [--view front,three_quarter,side] [--size 640] [--edges] [--focus X,Y,Z,R]
+//! ```
+//!
+//! Several views, separated by `+`, stand side by side. `--focus` frames a ball in place of
+//! the whole mesh (the mesh's own units).
+
+use std::error::Error;
+
+use fabrig_core::Point;
+use fabrig_core::mesh::{Mesh, Polygons};
+use fabrig_core::render::{Edges, FaceLook, Picture, Sheet, View, mesh_layers};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut files = Vec::new();
+    let mut views = "front".to_owned();
+    let mut size = 640u32;
+    let mut has_edges = false;
+    let mut focus = Vec::new();
+    let mut args = std::env::args().skip(1);
+    while let Some(arg) = args.next() {
+        let mut value = || args.next().ok_or(format!("{arg} needs a value"));
+        match arg.as_str() {
+            "--view" => views = value()?,
+            "--size" => size = value()?.parse()?,
+            "--edges" => has_edges = true,
+            "--focus" => {
+                let text = value()?;
+                let numbers: Vec<f64> =
+                    text.split(',').map(str::parse).collect::<Result<_, _>>()?;
+                let [x, y, z, r] = numbers[..] else {
+                    return Err("--focus needs X,Y,Z,R".into());
+                };
+                for sign in [-1.0, 1.0] {
+                    focus.push(Point::new(x + sign * r, y + sign * r, z));
+                    focus.push(Point::new(x, y - sign * r, z + sign * r));
+                }
+            }
+            _ => files.push(arg),
+        }
+    }
+    let [input, output] = &files[..] else {
+        return Err("usage: look MESH.obj OUT.png [--view a+b] [--size N] [--edges]".into());
+    };
+    let mesh = read_obj(input)?;
+    let mut layers = mesh_layers(&mesh, &FaceLook::default())?;
+    if has_edges {
+        layers = layers
+            .into_iter()
+            .map(|layer| layer.with_edges(Edges::default()))
+            .collect();
+    }
+    let mut sheet = Sheet::new();
+    let views: Vec<&str> = views.split('+').collect();
+    for name in &views {
+        let picture = Picture::new(size, size)
+            .with_view(name.parse::<View>()?)
+            .with_focus(focus.clone())
+            .with_layers(layers.clone());
+        sheet.push(picture.render()?, *name);
+    }
+    sheet.compose(views.len() as u32)?.save_png(output)?;
+    Ok(())
+}
+
+/// Vertices and faces of an OBJ file; everything else is passed over.
+fn read_obj(path: &str) -> Result<Mesh, Box<dyn Error>> {
+    let text = std::fs::read_to_string(path)?;
+    let mut positions = Vec::new();
+    let mut polygons = Polygons::new();
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                let c: Vec<f64> = words.take(3).map(str::parse).collect::<Result<_, _>>()?;
+                let [x, y, z] = c[..] else {
+                    return Err(format!("bad vertex: {line}").into());
+                };
+                positions.push(Point::new(x, y, z));
+            }
+            Some("f") => {
+                let mut corners = Vec::new();
+                for word in words {
+                    let index: i64 = word.split('/').next().unwrap_or("").parse()?;
+                    let from_end = positions.len() as i64 + index;
+                    corners.push(u32::try_from(if index < 0 { from_end } else { index - 1 })?);
+                }
+                polygons.push(&corners);
+            }
+            _ => {}
+        }
+    }
+    Ok(Mesh::new(positions, polygons)?)
+}
