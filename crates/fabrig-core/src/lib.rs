@@ -20,6 +20,7 @@
 
 pub mod anatomy;
 pub mod atomic_file;
+pub mod facs;
 pub mod mesh;
 #[cfg(feature = "render")]
 pub mod render;
