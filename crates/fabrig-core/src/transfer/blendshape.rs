@@ -1,0 +1,183 @@
+//! Muscle shapes: whole-face shapes sampled on patches (Eq. 1-2).
+//!
+//! A node hangs at depth `d` under a place `p` of the skin. Where a shape moves the skin to
+//! `p'` with normal `n'`, the node moves by `(p' - d n') - (p - d n)`: it follows its place
+//! and swings with the normal. So each muscle shape holds the muscle's own contraction and
+//! the passive motion that other muscles cause.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::anatomy::{PatchChart, SurfaceNode};
+use crate::mesh::vertex_normals;
+use crate::template::{Template, WholeFaceShape};
+use crate::transfer::TransferError;
+use crate::{Point, Vector};
+
+/// Rounds of neighbour averaging of the normals that nodes swing with: enough to keep the
+/// crease of a lip or lid from turning a node over.
+const NORMAL_SMOOTHING_ROUNDS: usize = 3;
+
+/// One template shape on one patch, Db_i of Eq. 3.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MuscleShape {
+    /// `zygomaticus_major_l.mouthSmileLeft`
+    pub name: String,
+    /// Index in [`Template::shapes`].
+    pub shape: u32,
+    /// Displacement of every node at weight 1 on the template. [mm], shape [node_count]
+    pub deltas: Vec<Vector3<f32>>,
+}
+
+/// Vertex normals averaged over neighbours, unit length.
+pub fn smoothed_normals(positions: &[Point], triangles: &[[u32; 3]], rounds: usize) -> Vec<Vector> {
+    let mut normals = vertex_normals(positions, triangles);
+    for _ in 0..rounds {
+        let mut sums = normals.clone();
+        for t in triangles {
+            let total: Vector = t.iter().map(|&v| normals[v as usize]).sum();
+            for &v in t {
+                sums[v as usize] += total;
+            }
+        }
+        for (normal, sum) in normals.iter_mut().zip(sums) {
+            *normal = sum.try_normalize(f64::EPSILON).unwrap_or(*normal);
+        }
+    }
+    normals
+}
+
+/// Samples whole-face shapes of one template anywhere at or under its skin.
+pub struct ShapeSampler<'a> {
+    template: &'a Template,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<Vector>,
+}
+
+/// One shape at weight 1 on every skin vertex.
+pub struct SampledShape {
+    /// Displacements of the skin. [mm]
+    deltas: Vec<Vector>,
+    /// Change of the smoothed normals.
+    normal_deltas: Vec<Vector>,
+}
+
+impl<'a> ShapeSampler<'a> {
+    /// Prepares the template's neutral skin.
+    pub fn new(template: &'a Template) -> Self {
+        let triangles = template.skin.triangles();
+        let normals =
+            smoothed_normals(template.skin.positions(), &triangles, NORMAL_SMOOTHING_ROUNDS);
+        Self {
+            template,
+            triangles,
+            normals,
+        }
+    }
+
+    /// Triangles of the template's skin.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Spreads one shape over all vertices, with the normals it makes.
+    pub fn sample(&self, shape: &WholeFaceShape) -> SampledShape {
+        let rest = self.template.skin.positions();
+        let mut deltas = vec![Vector::zeros(); rest.len()];
+        for &(vertex, delta) in &shape.deltas {
+            deltas[vertex as usize] = delta;
+        }
+        let moved: Vec<Point> = rest.iter().zip(&deltas).map(|(p, d)| p + d).collect();
+        let normals = smoothed_normals(&moved, &self.triangles, NORMAL_SMOOTHING_ROUNDS);
+        let normal_deltas = normals
+            .iter()
+            .zip(&self.normals)
+            .map(|(moved, rest)| moved - rest)
+            .collect();
+        SampledShape {
+            deltas,
+            normal_deltas,
+        }
+    }
+
+    /// Displacement of one node under a sampled shape. [mm]
+    pub fn node_delta(&self, shape: &SampledShape, node: &SurfaceNode) -> Vector {
+        let corners = self.triangles[node.triangle as usize];
+        let mut delta = Vector::zeros();
+        for (&corner, weight) in corners.iter().zip(node.barycentric) {
+            let v = corner as usize;
+            delta += weight * (shape.deltas[v] - node.depth * shape.normal_deltas[v]);
+        }
+        delta
+    }
+
+    /// Checks that every node of the charts lies on this template.
+    ///
+    /// # Errors
+    ///
+    /// [`TransferError::NodeOutOfRange`].
+    pub fn check(&self, charts: &[PatchChart]) -> Result<(), TransferError> {
+        for chart in charts {
+            for (index, node) in chart.nodes.iter().enumerate() {
+                if node.triangle as usize >= self.triangles.len() {
+                    return Err(TransferError::NodeOutOfRange {
+                        patch: chart.name.clone(),
+                        node: index,
+                        triangle: node.triangle,
+                        triangle_count: self.triangles.len(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Samples every shape of the template on every patch; shapes that move no node of a patch
+/// by `threshold_mm` are left out of it.
+///
+/// Returns one list per chart, shapes in the template's order.
+///
+/// # Errors
+///
+/// [`TransferError::NodeOutOfRange`] where a chart does not belong to this template.
+pub fn muscle_shapes(
+    template: &Template,
+    charts: &[PatchChart],
+    threshold_mm: f64,
+) -> Result<Vec<Vec<MuscleShape>>, TransferError> {
+    let sampler = ShapeSampler::new(template);
+    sampler.check(charts)?;
+    let by_shape: Vec<Vec<Option<MuscleShape>>> = template
+        .shapes
+        .par_iter()
+        .enumerate()
+        .map(|(index, shape)| {
+            let sampled = sampler.sample(shape);
+            charts
+                .iter()
+                .map(|chart| {
+                    let deltas: Vec<Vector> = chart
+                        .nodes
+                        .iter()
+                        .map(|node| sampler.node_delta(&sampled, node))
+                        .collect();
+                    let moves = deltas.iter().any(|d| d.norm() >= threshold_mm);
+                    moves.then(|| MuscleShape {
+                        name: format!("{}.{}", chart.name, shape.name),
+                        shape: index as u32,
+                        deltas: deltas.iter().map(|d| d.cast::<f32>()).collect(),
+                    })
+                })
+                .collect()
+        })
+        .collect();
+    let mut by_patch: Vec<Vec<MuscleShape>> = vec![Vec::new(); charts.len()];
+    for shapes in by_shape {
+        for (patch, shape) in by_patch.iter_mut().zip(shapes) {
+            patch.extend(shape);
+        }
+    }
+    Ok(by_patch)
+}

@@ -1,0 +1,30 @@
+//! Transfer: the template's shapes on the patches of another face, and their sum at any
+//! instant.
+//!
+//! Eq. 1-2 turn whole-face shapes into muscle shapes, one set a patch ([`muscle_shapes`]);
+//! Eq. 3, `X_p = b_0 + alpha_p sum_i w_i Db_i`, puts them on a face ([`PatchTransfer`]), with
+//! three parts that a sum of straight lines cannot hold: the jaw turns about its hinge
+//! ([`JawField`]), lids slide over the eyeball ([`LidField`]), and lids that close meet on a
+//! face whose eyes open differently ([`LidClosing`]).
+//!
+//! # Source
+//!
+//! Zhu & Joslin 2024, section 3.3; the hinge and the lids are this project's own.
+
+mod alpha;
+mod blendshape;
+mod closing;
+mod error;
+mod evaluate;
+mod jaw;
+mod lids;
+mod roles;
+
+pub use alpha::{ALPHA_LIMITS, size_ratio};
+pub use blendshape::{MuscleShape, ShapeSampler, muscle_shapes, smoothed_normals};
+pub use closing::LidClosing;
+pub use error::TransferError;
+pub use evaluate::{PatchTransfer, ShapeWeights, TransferContext};
+pub use jaw::{JawField, JawMode, JawPose};
+pub use lids::{LidField, LidNode};
+pub use roles::{EyeShapes, JawShapes};
