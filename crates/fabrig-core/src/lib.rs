@@ -24,7 +24,9 @@ pub mod facs;
 pub mod mesh;
 #[cfg(feature = "render")]
 pub mod render;
+pub mod skin;
 pub mod template;
+pub mod transfer;
 
 /// A position, double precision. [mm] unless stated.
 pub type Point = nalgebra::Point3<f64>;

@@ -57,9 +57,8 @@ mod tests {
         };
         let nodes = (0..grid.v_count)
             .flat_map(|v| {
-                (0..grid.u_count).map(move |u| {
-                    Point::new(f64::from(u) * scale_u, f64::from(v) * scale_v, 0.0)
-                })
+                (0..grid.u_count)
+                    .map(move |u| Point::new(f64::from(u) * scale_u, f64::from(v) * scale_v, 0.0))
             })
             .collect();
         (grid, nodes)
@@ -85,7 +84,10 @@ mod tests {
     fn a_patch_without_size_keeps_the_template_amplitude() {
         let (grid, template) = plane(0.0, 0.0);
         let (_, face) = plane(1.0, 1.0);
-        assert_eq!(size_ratio(PatchKind::FatPad, grid, &template, &template), 1.0);
+        assert_eq!(
+            size_ratio(PatchKind::FatPad, grid, &template, &template),
+            1.0
+        );
         assert_eq!(size_ratio(PatchKind::FatPad, grid, &template, &face), 1.0);
     }
 }

@@ -67,8 +67,11 @@ impl<'a> ShapeSampler<'a> {
     /// Prepares the template's neutral skin.
     pub fn new(template: &'a Template) -> Self {
         let triangles = template.skin.triangles();
-        let normals =
-            smoothed_normals(template.skin.positions(), &triangles, NORMAL_SMOOTHING_ROUNDS);
+        let normals = smoothed_normals(
+            template.skin.positions(),
+            &triangles,
+            NORMAL_SMOOTHING_ROUNDS,
+        );
         Self {
             template,
             triangles,

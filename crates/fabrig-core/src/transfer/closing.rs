@@ -45,7 +45,12 @@ impl<'a> LidClosing<'a> {
                 let upper = template.regions.find(&format!("upper_lid_{side}"))?;
                 let lower = template.regions.find(&format!("lower_lid_{side}"))?;
                 let member = |id| -> Vec<bool> {
-                    template.regions.vertex_regions.iter().map(|r| *r == id).collect()
+                    template
+                        .regions
+                        .vertex_regions
+                        .iter()
+                        .map(|r| *r == id)
+                        .collect()
                 };
                 let shape = shapes.blink?;
                 let (upper, lower) = (member(upper), member(lower));
@@ -86,9 +91,8 @@ impl<'a> LidClosing<'a> {
         let mut lower_marks = Vec::with_capacity(eye.pairs.len());
         for &MarginPair { upper, lower } in &eye.pairs {
             let (du, dl) = (eye.deltas[upper], eye.deltas[lower]);
-            let left_open = |at: &[Point], scale: f64| {
-                (at[upper] + scale * du) - (at[lower] + scale * dl)
-            };
+            let left_open =
+                |at: &[Point], scale: f64| (at[upper] + scale * du) - (at[lower] + scale * dl);
             let gap = left_open(self.positions, alpha) - left_open(rest, 1.0);
             let share = du.norm() / (du.norm() + dl.norm()).max(f64::EPSILON);
             upper_marks.push((upper, -share * gap));
@@ -96,22 +100,26 @@ impl<'a> LidClosing<'a> {
         }
         (0..rest.len())
             .map(|v| {
-                let marks = if eye.upper[v] {
-                    &upper_marks
-                } else if eye.lower[v] {
-                    &lower_marks
-                } else {
+                let amount = eye.deltas[v].norm();
+                if amount == 0.0 {
                     return Vector::zeros();
-                };
+                }
+                // Skin around the lids belongs to whichever margin is nearer at rest.
+                let uppers = upper_marks.iter().filter(|_| !eye.lower[v]);
+                let lowers = lower_marks.iter().filter(|_| !eye.upper[v]);
                 let (mut sum, mut total) = (Vector::zeros(), 0.0);
-                for &(margin, correction) in marks {
+                for &(margin, correction) in uppers.chain(lowers) {
                     let distance = (rest[v] - rest[margin]).norm() / MARGIN_WIDTH;
                     let kernel = (-distance * distance).exp();
-                    let ratio = eye.deltas[v].norm() / eye.deltas[margin].norm().max(0.1);
+                    let ratio = amount / eye.deltas[margin].norm().max(0.1);
                     sum += kernel * ratio.min(1.0) * correction;
                     total += kernel;
                 }
-                if total > 1e-9 { sum / total } else { Vector::zeros() }
+                if total > 1e-9 {
+                    sum / total
+                } else {
+                    Vector::zeros()
+                }
             })
             .collect()
     }
@@ -138,10 +146,8 @@ fn meeting_pairs(
         .iter()
         .filter_map(|&upper| nearest(upper, &lowers).map(|(lower, _)| MarginPair { upper, lower }))
         .collect();
-    pairs.extend(
-        lowers
-            .iter()
-            .filter_map(|&lower| nearest(lower, &uppers).map(|(upper, _)| MarginPair { upper, lower })),
-    );
+    pairs.extend(lowers.iter().filter_map(|&lower| {
+        nearest(lower, &uppers).map(|(upper, _)| MarginPair { upper, lower })
+    }));
     pairs
 }

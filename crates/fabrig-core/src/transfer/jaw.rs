@@ -127,8 +127,7 @@ impl JawField {
             let back = m - share(opened + closed);
             let open_residual = p + opened - turned(p, m);
             let close_residual = p + closed - turned(p, -back);
-            let pair =
-                p + opened + closed - turned(p, m - back) - open_residual - close_residual;
+            let pair = p + opened + closed - turned(p, m - back) - open_residual - close_residual;
             field.open.push(m as f32);
             field.open_residual.push(open_residual.cast());
             field.close.push(back as f32);

@@ -120,8 +120,7 @@ impl LidNode {
         let along = velocity.dot(&direction);
         let turning = (*velocity - direction * along) / distance;
         *position += direction * (self.share * (radius - distance));
-        *velocity +=
-            (turning * (radius - distance) + direction * (rate - along)) * self.share;
+        *velocity += (turning * (radius - distance) + direction * (rate - along)) * self.share;
     }
 }
 
@@ -156,13 +155,18 @@ mod tests {
             shape: 0,
             deltas: vec![(closed - open).cast()],
         };
-        let field =
-            LidField::new(&[open], &eyes, &[open], &eyes, &[shape.clone()], 1.0).unwrap();
+        let field = LidField::new(&[open], &eyes, &[open], &eyes, &[shape.clone()], 1.0).unwrap();
         let node = &field.nodes[0];
         let center = eyes[0].center.cast::<f32>();
         let mut half = open.cast::<f32>() + shape.deltas[0] * 0.5;
         assert!((half - center).norm() < 11.5);
-        node.slide(&center, &mut half, &mut Vector3::zeros(), 0.5 * node.radius_changes[0], 0.0);
+        node.slide(
+            &center,
+            &mut half,
+            &mut Vector3::zeros(),
+            0.5 * node.radius_changes[0],
+            0.0,
+        );
         assert!(((half - center).norm() - 13.0).abs() < 1e-4);
     }
 
