@@ -2,8 +2,15 @@
 //!
 //! A pack is data. Adding a muscle, a shape or another template changes no code.
 
+pub mod build;
+mod description;
+mod error;
+mod geometry;
+mod load;
 mod pack;
 
+pub use error::TemplateError;
+pub use load::{PackFiles, human};
 pub use pack::{
     EyeSocket, JawHinge, Landmarks, Region, RegionId, Regions, RigidBody, RigidPart, Template,
     WholeFaceShape,

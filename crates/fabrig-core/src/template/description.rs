@@ -1,0 +1,103 @@
+//! `template.toml`: what a pack is called, its landmarks and regions, and how it is built.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::TemplateError;
+
+/// The text of `template.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// Name of the pack.
+    pub name: String,
+    /// Version of the pack's contents.
+    pub version: u32,
+    /// Whose work it stands on.
+    pub credit: String,
+    /// How it is made from source data; absent in a pack that is not built here.
+    pub build: Option<BuildRecipe>,
+    /// Named points, by name; those that end in `_l` are mirrored to `_r`.
+    pub landmarks: BTreeMap<String, LandmarkEntry>,
+    /// Labelled parts, painted in this order, later over earlier.
+    pub regions: Vec<RegionEntry>,
+}
+
+/// A named point of the skin.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkEntry {
+    /// Vertex of the skin.
+    pub vertex: u32,
+    /// Where it is, in words.
+    pub meaning: String,
+}
+
+/// A labelled part of the skin and the rule that says where it is.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionEntry {
+    /// Name; one that ends in `_l` is mirrored to `_r`.
+    pub name: String,
+    /// Regions that it must never be matched or bridged to.
+    #[serde(default)]
+    pub apart_from: Vec<String>,
+    /// Landmarks of a closed outline, joined by the shortest ways along edges. Empty: the
+    /// whole skin.
+    #[serde(default)]
+    pub outline: Vec<String>,
+    /// A landmark inside the outline: the region spreads from it along edges up to the outline.
+    pub inside: Option<String>,
+    /// Whether the outline's own vertices belong to the region.
+    #[serde(default)]
+    pub with_outline: bool,
+}
+
+/// How a pack is made from the MakeHuman base mesh and its targets.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BuildRecipe {
+    /// Source vertex on the mid plane at the front of the neck where the head is cut off; the
+    /// cut follows the edge loop through it.
+    pub neck_vertex: u32,
+    /// Length of one source unit. [mm]
+    pub millimetres_per_unit: f64,
+    /// Landmark pair whose midpoint is the origin of the head frame.
+    pub origin: String,
+    /// Angles of eyeLookUp, eyeLookDown, eyeLookIn and eyeLookOut at weight 1. [degrees]
+    pub look_degrees: [f64; 4],
+    /// Names of the whole-face shapes in the pack's order.
+    pub shapes: Vec<String>,
+    /// Shapes that open the jaw, push it forward and to the left.
+    pub jaw_shapes: [String; 3],
+    /// Shape that puts the tongue out.
+    pub tongue_shape: String,
+    /// Targets and how much of each makes the identity.
+    pub identity: BTreeMap<String, f64>,
+}
+
+impl Description {
+    /// Reads the text of a `template.toml`.
+    ///
+    /// # Errors
+    ///
+    /// [`TemplateError::Text`] with line and column.
+    pub fn parse(text: &str) -> Result<Self, TemplateError> {
+        toml::from_str(text).map_err(|source| TemplateError::Text {
+            file: "template.toml",
+            source: Box::new(source),
+        })
+    }
+}
+
+/// The name on the other side: `_l` for `_r` and back, `Left` for `Right` and back; `None` for
+/// a name that has no side.
+pub fn mirrored_name(name: &str) -> Option<String> {
+    for (a, b) in [("_l", "_r"), ("_r", "_l"), ("Left", "Right"), ("Right", "Left")] {
+        if let Some(stem) = name.strip_suffix(a) {
+            return Some(format!("{stem}{b}"));
+        }
+    }
+    None
+}
