@@ -94,7 +94,12 @@ impl Description {
 /// The name on the other side: `_l` for `_r` and back, `Left` for `Right` and back; `None` for
 /// a name that has no side.
 pub fn mirrored_name(name: &str) -> Option<String> {
-    for (a, b) in [("_l", "_r"), ("_r", "_l"), ("Left", "Right"), ("Right", "Left")] {
+    for (a, b) in [
+        ("_l", "_r"),
+        ("_r", "_l"),
+        ("Left", "Right"),
+        ("Right", "Left"),
+    ] {
         if let Some(stem) = name.strip_suffix(a) {
             return Some(format!("{stem}{b}"));
         }

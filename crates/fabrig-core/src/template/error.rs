@@ -35,7 +35,9 @@ pub enum TemplateError {
         source: Box<toml::de::Error>,
     },
     /// The file does not start like a pack's geometry.
-    #[error("not a template's geometry: the file starts with {found:02x?}, expected {expected:02x?}")]
+    #[error(
+        "not a template's geometry: the file starts with {found:02x?}, expected {expected:02x?}"
+    )]
     WrongMagic {
         /// First bytes of the file.
         found: Vec<u8>,
@@ -102,7 +104,9 @@ pub enum TemplateError {
         count: usize,
     },
     /// Mirroring twice does not lead back, or not to the mirrored place.
-    #[error("the mirror image of vertex {vertex} is given as {mirror}, which is not its mirror image")]
+    #[error(
+        "the mirror image of vertex {vertex} is given as {mirror}, which is not its mirror image"
+    )]
     Mirror {
         /// The vertex.
         vertex: u32,

@@ -155,13 +155,14 @@ pub(super) fn landmarks(
 ) -> Result<Landmarks, TemplateError> {
     let mut landmarks = Landmarks::new();
     for (name, entry) in &description.landmarks {
-        let image = *mirror
-            .get(entry.vertex as usize)
-            .ok_or_else(|| TemplateError::OutOfRange {
-                what: format!("landmark {name:?}"),
-                found: entry.vertex as usize,
-                count: mirror.len(),
-            })?;
+        let image =
+            *mirror
+                .get(entry.vertex as usize)
+                .ok_or_else(|| TemplateError::OutOfRange {
+                    what: format!("landmark {name:?}"),
+                    found: entry.vertex as usize,
+                    count: mirror.len(),
+                })?;
         let other = mirrored_name(name);
         if other.is_none() && image != entry.vertex {
             return Err(TemplateError::Mirror {
@@ -169,8 +170,8 @@ pub(super) fn landmarks(
                 mirror: image,
             });
         }
-        for (name, vertex) in std::iter::once((name.clone(), entry.vertex))
-            .chain(other.map(|other| (other, image)))
+        for (name, vertex) in
+            std::iter::once((name.clone(), entry.vertex)).chain(other.map(|other| (other, image)))
         {
             if landmarks.insert(name.clone(), vertex).is_some() {
                 return Err(TemplateError::Duplicate {
@@ -226,7 +227,10 @@ pub(super) fn region_list(description: &Description) -> Result<Vec<Region>, Temp
             }
             Ok(Region {
                 name: name.clone(),
-                apart_from: apart.iter().map(|a| find(name, a)).collect::<Result<_, _>>()?,
+                apart_from: apart
+                    .iter()
+                    .map(|a| find(name, a))
+                    .collect::<Result<_, _>>()?,
             })
         })
         .collect()
@@ -282,13 +286,14 @@ fn shapes(stored: &StoredGeometry) -> Result<Vec<WholeFaceShape>, TemplateError>
                 deltas
             }
             StoredShape::MirrorOf(other) => {
-                let source = shapes
-                    .get(*other as usize)
-                    .ok_or_else(|| TemplateError::OutOfRange {
-                        what: what(),
-                        found: *other as usize,
-                        count: index,
-                    })?;
+                let source =
+                    shapes
+                        .get(*other as usize)
+                        .ok_or_else(|| TemplateError::OutOfRange {
+                            what: what(),
+                            found: *other as usize,
+                            count: index,
+                        })?;
                 mirrored_deltas(&source.deltas, &stored.mirror)
             }
         };
@@ -311,10 +316,7 @@ fn mirrored_deltas(deltas: &[(u32, crate::Vector)], mirror: &[u32]) -> Vec<(u32,
 
 type PartDeltas = Vec<(u32, u32, Vec<crate::Vector>)>;
 
-fn part_deltas(
-    stored: &StoredGeometry,
-    parts: &[RigidPart],
-) -> Result<PartDeltas, TemplateError> {
+fn part_deltas(stored: &StoredGeometry, parts: &[RigidPart]) -> Result<PartDeltas, TemplateError> {
     stored
         .part_deltas
         .iter()

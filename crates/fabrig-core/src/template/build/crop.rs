@@ -22,7 +22,9 @@ pub(super) struct Head {
 pub(super) fn crop_head(base: &BaseMesh, neck_vertex: u32) -> Result<Head, TemplateError> {
     let body = base.group("body")?;
     let rings = FaceRings::new(body);
-    let neck: BTreeSet<u32> = edge_loop(&rings, body, base, neck_vertex)?.into_iter().collect();
+    let neck: BTreeSet<u32> = edge_loop(&rings, body, base, neck_vertex)?
+        .into_iter()
+        .collect();
     let top = body
         .iter()
         .flatten()

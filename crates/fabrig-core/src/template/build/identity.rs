@@ -25,7 +25,11 @@ pub(super) fn identity(
 }
 
 /// One vector per vertex of the base mesh. [dm]
-pub(super) fn dense(name: &str, target: &Target, base: &BaseMesh) -> Result<Vec<Vector>, TemplateError> {
+pub(super) fn dense(
+    name: &str,
+    target: &Target,
+    base: &BaseMesh,
+) -> Result<Vec<Vector>, TemplateError> {
     let mut dense = vec![Vector::zeros(); base.positions.len()];
     for (vertex, delta) in target {
         *dense

@@ -41,8 +41,8 @@ pub struct BuildReport {
 /// [`TemplateError`]; `geometry.bin` is only replaced by a whole file.
 pub fn build_template(data: &Path, folder: &Path) -> Result<BuildReport, TemplateError> {
     let path = folder.join("template.toml");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|source| TemplateError::Read { path, source })?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|source| TemplateError::Read { path, source })?;
     let (bytes, report) = build_geometry(data, &text)?;
     let path = folder.join("geometry.bin");
     let write = || -> std::io::Result<()> {
@@ -90,9 +90,8 @@ pub fn build_geometry(
         .map(|(name, group, _)| part(&base, name, group))
         .collect::<Result<Vec<_>, _>>()?;
 
-    let take = |source: &[u32]| -> Vec<Point> {
-        source.iter().map(|&s| frame[s as usize]).collect()
-    };
+    let take =
+        |source: &[u32]| -> Vec<Point> { source.iter().map(|&s| frame[s as usize]).collect() };
     let skin = stored_mesh(&take(&head.source), &head.faces);
     let shapes = Shapes {
         data,
@@ -197,8 +196,8 @@ fn stored_shapes(shapes: &Shapes<'_>, head: &Head) -> Result<NamedShapes, Templa
     let mut stored: Vec<(String, StoredShape)> = Vec::new();
     let mut amplitudes: Vec<(String, f64)> = Vec::new();
     for name in &shapes.recipe.shapes {
-        let partner = mirrored_name(name)
-            .and_then(|other| stored.iter().position(|(n, _)| *n == other));
+        let partner =
+            mirrored_name(name).and_then(|other| stored.iter().position(|(n, _)| *n == other));
         let (shape, amplitude) = match partner {
             Some(other) => (StoredShape::MirrorOf(other as u32), amplitudes[other].1),
             None => {
@@ -246,7 +245,11 @@ fn jaw(shapes: &Shapes<'_>, teeth: &Part, frame: &[Point]) -> Result<JawHinge, T
         Ok(take(&shapes.symmetric(name)?, &teeth.source))
     };
     let rest: Vec<Point> = teeth.source.iter().map(|&s| frame[s as usize]).collect();
-    let open: Vec<Point> = rest.iter().zip(of(&shapes.recipe.jaw_shapes[0])?).map(|(p, d)| p + d).collect();
+    let open: Vec<Point> = rest
+        .iter()
+        .zip(of(&shapes.recipe.jaw_shapes[0])?)
+        .map(|(p, d)| p + d)
+        .collect();
     let (open_angle, center) = fit_hinge(&rest, &open)?;
     Ok(JawHinge {
         center,

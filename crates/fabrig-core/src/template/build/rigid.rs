@@ -30,7 +30,11 @@ pub(super) fn part(base: &BaseMesh, name: &str, group: &str) -> Result<Part, Tem
     if name == "eye_r" {
         let left = part(base, "eye_l", PARTS[0].1)?;
         return Ok(Part {
-            source: left.source.iter().map(|&s| base.mirror[s as usize]).collect(),
+            source: left
+                .source
+                .iter()
+                .map(|&s| base.mirror[s as usize])
+                .collect(),
             faces: left
                 .faces
                 .iter()
@@ -88,9 +92,8 @@ pub(super) fn fit_sphere(points: &[Point]) -> Result<(Point, f64), TemplateError
 /// point that stays where it is.
 pub(super) fn fit_hinge(rest: &[Point], moved: &[Point]) -> Result<(f64, Point), TemplateError> {
     let flat = |p: &Point| Vector2::new(p.y, p.z);
-    let mean = |points: &[Point]| {
-        points.iter().map(flat).sum::<Vector2<f64>>() / points.len() as f64
-    };
+    let mean =
+        |points: &[Point]| points.iter().map(flat).sum::<Vector2<f64>>() / points.len() as f64;
     let (rest_mean, moved_mean) = (mean(rest), mean(moved));
     let (mut cross, mut dot) = (0.0, 0.0);
     for (p, q) in rest.iter().zip(moved) {
@@ -101,12 +104,13 @@ pub(super) fn fit_hinge(rest: &[Point], moved: &[Point]) -> Result<(f64, Point),
     let angle = cross.atan2(dot);
     let (sin, cos) = angle.sin_cos();
     let turn = Matrix2::new(cos, -sin, sin, cos);
-    let center = (Matrix2::identity() - turn)
-        .try_inverse()
-        .ok_or_else(|| TemplateError::Source {
-            reason: "the lower teeth do not turn when the jaw opens".to_owned(),
-        })?
-        * (moved_mean - turn * rest_mean);
+    let center =
+        (Matrix2::identity() - turn)
+            .try_inverse()
+            .ok_or_else(|| TemplateError::Source {
+                reason: "the lower teeth do not turn when the jaw opens".to_owned(),
+            })?
+            * (moved_mean - turn * rest_mean);
     Ok((angle, Point::new(0.0, center.x, center.y)))
 }
 
