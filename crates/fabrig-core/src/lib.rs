@@ -22,6 +22,7 @@ pub mod anatomy;
 pub mod atomic_file;
 pub mod facs;
 pub mod mesh;
+pub mod registration;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod skin;

@@ -1,0 +1,219 @@
+//! What registration needs to know of a template: which of its vertices have a counterpart on
+//! any face, where lips and lids part, and its surface for queries.
+
+use super::RegistrationError;
+use super::closest_grid::Sample;
+use crate::mesh::{Surface, Topology, triangle_normals, vertex_normals};
+use crate::template::{RegionId, Template};
+use crate::{Point, Vector};
+
+/// How a template vertex takes part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Role {
+    /// Inside the mouth, a socket, a nostril: follows by smoothness alone.
+    Hidden,
+    /// Skin that many faces lack or that hair covers: neck, scalp, ears.
+    Outlying,
+    /// The face proper.
+    Face,
+}
+
+/// An opening whose two sides must be told apart.
+#[derive(Debug, Clone)]
+pub(super) struct Opening {
+    pub(super) kind: OpeningKind,
+    /// Vertices of the upper contact line, from the right corner (-X) to the left one (+X),
+    /// corners included.
+    pub(super) upper: Vec<u32>,
+    /// Vertices of the lower contact line, likewise.
+    pub(super) lower: Vec<u32>,
+}
+
+/// Which opening.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OpeningKind {
+    Mouth,
+    LeftEye,
+    RightEye,
+}
+
+impl OpeningKind {
+    pub(super) const ALL: [Self; 3] = [Self::Mouth, Self::LeftEye, Self::RightEye];
+
+    /// Region names: upper side, lower side, inside.
+    pub(super) fn regions(self) -> [&'static str; 3] {
+        match self {
+            Self::Mouth => ["upper_lip", "lower_lip", "mouth_interior"],
+            Self::LeftEye => ["upper_lid_l", "lower_lid_l", "socket_l"],
+            Self::RightEye => ["upper_lid_r", "lower_lid_r", "socket_r"],
+        }
+    }
+}
+
+/// A template prepared for registration.
+pub(super) struct FaceModel<'a> {
+    pub(super) template: &'a Template,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) topology: Topology,
+    pub(super) roles: Vec<Role>,
+    pub(super) normals: Vec<Vector>,
+    pub(super) surface: Surface,
+    pub(super) openings: Vec<Opening>,
+    triangle_roles: Vec<Role>,
+    unit_triangle_normals: Vec<Vector>,
+}
+
+impl<'a> FaceModel<'a> {
+    pub(super) fn new(template: &'a Template) -> Result<Self, RegistrationError> {
+        let lacks = |what: &str| RegistrationError::TemplateIncomplete {
+            template: template.name.clone(),
+            what: what.to_owned(),
+        };
+        let positions = template.skin.positions();
+        if template.regions.vertex_regions.len() != positions.len() {
+            return Err(lacks("a region for every skin vertex"));
+        }
+        let triangles = template.skin.triangles();
+        // Quad diagonals are edges too: the smoothness terms see every triangle.
+        let topology = Topology::from_triangles(positions.len(), &triangles);
+        let roles: Vec<Role> = template
+            .regions
+            .vertex_regions
+            .iter()
+            .map(|r| role_of(&template.regions.regions[r.0 as usize].name))
+            .collect();
+        if roles.iter().filter(|r| **r == Role::Face).count() < 50 {
+            return Err(lacks("regions of a face"));
+        }
+        let triangle_roles: Vec<Role> = triangles
+            .iter()
+            .map(|t| t.map(|v| roles[v as usize]).into_iter().min().unwrap_or(Role::Hidden))
+            .collect();
+        let openings = OpeningKind::ALL
+            .into_iter()
+            .filter_map(|kind| opening(template, &topology, kind))
+            .collect();
+        Ok(Self {
+            template,
+            normals: vertex_normals(positions, &triangles),
+            surface: Surface::new(positions, &triangles)?,
+            unit_triangle_normals: triangle_normals(positions, &triangles)
+                .into_iter()
+                .map(|n| n.try_normalize(0.0).unwrap_or_else(Vector::zeros))
+                .collect(),
+            triangle_roles,
+            topology,
+            triangles,
+            roles,
+            openings,
+        })
+    }
+
+    pub(super) fn positions(&self) -> &[Point] {
+        self.template.skin.positions()
+    }
+
+    /// Region of a vertex.
+    pub(super) fn region(&self, vertex: u32) -> RegionId {
+        self.template.regions.vertex_regions[vertex as usize]
+    }
+
+    /// The most forward point of the face.
+    pub(super) fn nose_tip(&self) -> Point {
+        self.template.landmark("nose_tip").unwrap_or_else(|| {
+            let best = (0..self.roles.len())
+                .filter(|&v| self.roles[v] == Role::Face)
+                .max_by(|&a, &b| self.positions()[a].z.total_cmp(&self.positions()[b].z));
+            self.positions()[best.unwrap_or(0)]
+        })
+    }
+
+    /// About `count` vertices of the front of the face, spread by farthest-point sampling from
+    /// the nose tip on: a prefix of a longer list is the shorter one.
+    pub(super) fn spread_samples(&self, count: usize) -> Vec<Sample> {
+        let candidates: Vec<usize> = (0..self.roles.len())
+            .filter(|&v| self.roles[v] == Role::Face && self.normals[v].z > -0.2)
+            .collect();
+        let mut distance: Vec<f64> = candidates
+            .iter()
+            .map(|&v| (self.positions()[v] - self.nose_tip()).norm_squared())
+            .collect();
+        let mut chosen = Vec::new();
+        while chosen.len() < count.min(candidates.len()) {
+            let Some(k) = (0..candidates.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b]))
+            else {
+                break;
+            };
+            let point = self.positions()[candidates[k]];
+            chosen.push(Sample {
+                point,
+                normal: self.normals[candidates[k]],
+            });
+            for (d, &v) in distance.iter_mut().zip(&candidates) {
+                *d = d.min((self.positions()[v] - point).norm_squared());
+            }
+        }
+        chosen
+    }
+
+    /// The closest place of the template's face to a point of the head frame within `reach`
+    /// whose normal agrees with `normal`.
+    pub(super) fn closest_on_face(
+        &self,
+        point: &Point,
+        reach: f64,
+        normal: &Vector,
+    ) -> Option<Point> {
+        let at = self.surface.closest_where(point, reach, |at| {
+            self.unit_triangle_normals[at.triangle as usize].dot(normal) > 0.4
+        })?;
+        (self.triangle_roles[at.triangle as usize] == Role::Face).then_some(at.point)
+    }
+}
+
+/// What a region's name says about its vertices.
+fn role_of(name: &str) -> Role {
+    const HIDDEN: [&str; 6] = ["mouth_interior", "socket", "nostril", "ear_canal", "interior", "inside"];
+    const OUTLYING: [&str; 4] = ["neck", "scalp", "ear", "nape"];
+    if HIDDEN.iter().any(|h| name.starts_with(h)) {
+        Role::Hidden
+    } else if OUTLYING
+        .iter()
+        .any(|o| name == *o || name.starts_with(&format!("{o}_")))
+    {
+        Role::Outlying
+    } else {
+        Role::Face
+    }
+}
+
+/// The contact lines of an opening: skin vertices of each side that touch the inside.
+fn opening(template: &Template, topology: &Topology, kind: OpeningKind) -> Option<Opening> {
+    let [upper, lower, inside] = kind.regions();
+    let regions = &template.regions;
+    let (upper, lower) = (regions.find(upper)?, regions.find(lower)?);
+    // One region inside, or one behind each side.
+    let is_inside = |v: u32| {
+        regions.regions[regions.vertex_regions[v as usize].0 as usize]
+            .name
+            .starts_with(inside)
+    };
+    let positions = template.skin.positions();
+    let line = |side: RegionId| {
+        let mut vertices: Vec<u32> = (0..positions.len() as u32)
+            .filter(|&v| {
+                regions.vertex_regions[v as usize] == side
+                    && topology
+                        .neighbours(v)
+                        .iter()
+                        .any(|&n| is_inside(n))
+            })
+            .collect();
+        vertices.sort_by(|&a, &b| {
+            positions[a as usize].x.total_cmp(&positions[b as usize].x).then(a.cmp(&b))
+        });
+        vertices
+    };
+    let (upper, lower) = (line(upper), line(lower));
+    (upper.len() >= 3 && lower.len() >= 3).then_some(Opening { kind, upper, lower })
+}

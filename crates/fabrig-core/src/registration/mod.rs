@@ -1,0 +1,40 @@
+//! Registration: a user's face in template topology, at true head size.
+//!
+//! Stages, each in its own file:
+//!
+//! 1. `clean`: a welded, oriented copy, split into pieces.
+//! 2. `alignment` (no landmarks) or `similarity` (landmarks): units, place, orientation.
+//! 3. `nonrigid_icp` on the coarse `node_graph`, then `refinement` at full resolution; mouth
+//!    and eyes by `openings`.
+//! 4. `mapping` from the user's vertices to the template, `parts` that are not skin, `report`.
+//!
+//! The user's mesh stays the skin; the registered template only carries anatomy to it.
+//!
+//! # Limits
+//!
+//! Lips and lids that are one closed surface have no contact line to match; the report says so
+//! (`mouth`, `eyes`). One face a mesh; hair that hides the face is taken for skin.
+
+mod alignment;
+mod clean;
+mod closest_grid;
+mod error;
+mod face_model;
+mod mapping;
+mod node_graph;
+mod nonrigid_icp;
+mod openings;
+mod parts;
+mod refinement;
+mod register;
+mod report;
+mod similarity;
+mod sparse;
+mod target;
+
+pub use clean::{CleaningReport, Sphere};
+pub use error::RegistrationError;
+pub use parts::RigidComponent;
+pub use register::{Progress, Registration, RegistrationOptions, register};
+pub use report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime};
+pub use similarity::MIN_LANDMARK_COUNT;

@@ -1,0 +1,498 @@
+//! The whole registration, stage by stage.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use nalgebra::{Similarity3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use super::alignment::align;
+use super::clean::{CleanMesh, clean, closed_volume};
+use super::face_model::{FaceModel, OpeningKind, Role};
+use super::mapping::map_vertices;
+use super::node_graph::NodeGraph;
+use super::nonrigid_icp::{Pin, deform_coarse};
+use super::openings::{FaceOpening, find_openings, opening_pins};
+use super::parts::{RigidComponent, eye_centers, recognise};
+use super::refinement::refine;
+use super::report::{
+    DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure,
+};
+use super::similarity::{MatchedLandmarks, from_landmarks, match_landmarks, umeyama, useful_landmarks};
+use super::target::Target;
+use super::{CleaningReport, RegistrationError};
+use crate::Point;
+use crate::mesh::{Mesh, Surface, SurfacePoint, vertex_normals};
+use crate::template::{RegionId, Template};
+
+/// Fewer triangles than this are no face.
+const MIN_TRIANGLE_COUNT: usize = 200;
+/// Pieces smaller than this share of the largest are not tried as the face.
+const PIECE_SHARE: f64 = 0.2;
+/// Alignments worse than this are not trusted whatever their margin. [mm]
+const MAX_RESIDUAL_MM: f64 = 8.0;
+
+/// What to register by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegistrationOptions {
+    /// Positions by landmark name in the mesh's own units: none, or at least
+    /// [`super::MIN_LANDMARK_COUNT`].
+    pub landmarks: BTreeMap<String, Point>,
+    /// Millimetres per unit of the mesh, where it is known; otherwise the face is scaled so
+    /// that its eyes are as far apart as the template's.
+    pub unit_mm: Option<f64>,
+    /// Margin below which an automatic alignment is refused, 0 to 1.
+    pub min_confidence: f64,
+}
+
+impl Default for RegistrationOptions {
+    fn default() -> Self {
+        Self {
+            landmarks: BTreeMap::new(),
+            unit_mm: None,
+            min_confidence: 0.15,
+        }
+    }
+}
+
+/// How far registration has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Name of the stage.
+    pub stage: &'static str,
+    /// Share of all work that is done, 0 to 1.
+    pub fraction: f64,
+}
+
+/// A registered face.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Registration {
+    /// The user's units to millimetres in the head frame (the template's frame).
+    pub to_head: Similarity3<f64>,
+    /// The template's vertices on this face. [mm, head frame]
+    pub positions: Vec<Point>,
+    /// What was measured.
+    pub report: RegistrationReport,
+    /// For every vertex of the user's mesh its place on the registered template, by side of
+    /// lips and lids.
+    pub face_points: Vec<SurfacePoint>,
+    /// Region of that place, one per vertex of the user's mesh.
+    pub face_regions: Vec<RegionId>,
+    /// Pieces that are not skin: eyeballs, teeth, tongue.
+    pub rigid_components: Vec<RigidComponent>,
+}
+
+/// Registers `face`, any mesh of a head or face, to `template`.
+///
+/// - `progress`: called between steps; `ControlFlow::Break` cancels
+///
+/// # Errors
+///
+/// [`RegistrationError`]: landmarks that do not fit, an alignment that does not stand out (with
+/// the landmarks to give), too little surface, a cancelled run.
+pub fn register(
+    face: &Mesh,
+    template: &Template,
+    options: &RegistrationOptions,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Registration, RegistrationError> {
+    check(options)?;
+    let mut clock = Clock {
+        progress,
+        times: Vec::new(),
+        started: Instant::now(),
+    };
+    clock.step("clean", 0.0)?;
+    let model = FaceModel::new(template)?;
+    let landmarks = match_landmarks(template, &options.landmarks)?;
+    let mut cleaned = clean(face);
+    let mut warnings = Vec::new();
+    let triangle_count = cleaned.pieces.first().map_or(0, |p| p.triangles.len());
+    if triangle_count < MIN_TRIANGLE_COUNT {
+        return Err(RegistrationError::TooFewTriangles {
+            triangle_count,
+            expected: MIN_TRIANGLE_COUNT,
+        });
+    }
+    clock.finish("clean");
+
+    clock.step("align", 0.05)?;
+    let start = align_face(&model, &mut cleaned, &landmarks, options)?;
+    clock.finish("align");
+
+    clock.step("deform", 0.35)?;
+    let piece = &cleaned.pieces[start.piece];
+    let target = target_of(&cleaned, start.piece, &start.to_head)?;
+    let graph = NodeGraph::new(model.positions(), &model.topology, 1);
+    let pins = Pins::new(&landmarks, &start.to_head);
+    let mut openings: Vec<FaceOpening> = Vec::new();
+    let coarse = deform_coarse(
+        &model,
+        &graph,
+        &target,
+        model.positions(),
+        &mut |vertices, is_first_of_stage| {
+            if is_first_of_stage {
+                openings = find_openings(&model, &target, vertices);
+            }
+            pins.at(&model, &openings, vertices, 1.0)
+        },
+        |share| clock.step("deform", 0.35 + 0.3 * share),
+    )?;
+    clock.finish("deform");
+
+    clock.step("refine", 0.65)?;
+    let openings = find_openings(&model, &target, &coarse);
+    let refined = refine(
+        &model,
+        &target,
+        &coarse,
+        &|vertices| pins.at(&model, &openings, vertices, 10.0),
+        |share| clock.step("refine", 0.65 + 0.25 * share),
+    )?;
+    clock.finish("refine");
+
+    clock.step("map", 0.9)?;
+    let to_true_size = true_size(&model, &refined, &start.to_head, options);
+    let to_head = to_true_size * start.to_head;
+    let positions: Vec<Point> =
+        refined.iter().map(|p| to_true_size.transform_point(p)).collect();
+    let face_positions: Vec<Point> =
+        face.positions().iter().map(|p| to_head.transform_point(p)).collect();
+    let mut triangles = face.triangles();
+    if cleaned.report.was_inside_out {
+        for t in &mut triangles {
+            t.swap(1, 2);
+        }
+    }
+    let normals = vertex_normals(&face_positions, &triangles);
+    let (face_points, face_regions) =
+        map_vertices(&model, face, &face_positions, &normals, &positions)?;
+    let clean_positions: Vec<Point> =
+        cleaned.positions.iter().map(|p| to_head.transform_point(p)).collect();
+    let rigid_components =
+        recognise(&model, &cleaned, start.piece, &clean_positions, &positions);
+    clock.finish("map");
+
+    let target = target_of(&cleaned, start.piece, &to_head)?;
+    let measures = measure(&model, &target, &positions)?;
+    let state = |kind: OpeningKind| {
+        if openings.iter().any(|o| o.kind == kind) {
+            OpeningState::Open
+        } else {
+            OpeningState::Fused
+        }
+    };
+    let landmark_distances = (!landmarks.names.is_empty()).then(|| {
+        DistanceStatistics::from_distances(
+            landmarks
+                .face
+                .iter()
+                .zip(&landmarks.vertices)
+                .map(|(p, &v)| (to_head.transform_point(p) - positions[v as usize]).norm())
+                .collect(),
+        )
+    });
+    warn(&cleaned.report, piece.triangles.len(), &mut warnings);
+    if measures.folded_triangles > 0 {
+        warnings.push(format!(
+            "{} triangles of the registered face are folded over",
+            measures.folded_triangles
+        ));
+    }
+    if state(OpeningKind::Mouth) == OpeningState::Fused {
+        warnings.push("the lips are one closed surface: they stretch when they part".to_owned());
+    }
+    clock.finish("report");
+    let report = RegistrationReport {
+        cleaning: cleaned.report.clone(),
+        used_landmarks: !landmarks.names.is_empty(),
+        confidence: start.confidence,
+        alignment_residual_mm: start.residual_mm,
+        millimetres_per_unit: to_head.scaling(),
+        template_to_face: measures.template_to_face,
+        face_to_template: measures.face_to_template,
+        landmarks: landmark_distances,
+        coverage: measures.coverage,
+        folded_triangles: measures.folded_triangles,
+        triangle_quality: measures.triangle_quality,
+        mouth: state(OpeningKind::Mouth),
+        eyes: [state(OpeningKind::LeftEye), state(OpeningKind::RightEye)],
+        times: std::mem::take(&mut clock.times),
+        warnings,
+    };
+    clock.step("done", 1.0)?;
+    Ok(Registration {
+        to_head,
+        positions,
+        report,
+        face_points,
+        face_regions,
+        rigid_components,
+    })
+}
+
+fn check(options: &RegistrationOptions) -> Result<(), RegistrationError> {
+    if !(0.0..=1.0).contains(&options.min_confidence) {
+        return Err(RegistrationError::BadOption {
+            name: "min_confidence",
+            value: options.min_confidence,
+            expected: "a number from 0 to 1",
+        });
+    }
+    if let Some(value) = options.unit_mm {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(RegistrationError::BadOption {
+                name: "unit_mm",
+                value,
+                expected: "a positive number of millimetres",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Progress, cancellation and times.
+struct Clock<'a> {
+    progress: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
+    times: Vec<StageTime>,
+    started: Instant,
+}
+
+impl Clock<'_> {
+    fn step(&mut self, stage: &'static str, fraction: f64) -> Result<(), RegistrationError> {
+        match (self.progress)(Progress { stage, fraction }) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(RegistrationError::Cancelled { stage }),
+        }
+    }
+
+    fn finish(&mut self, stage: &str) {
+        self.times.push(StageTime {
+            stage: stage.to_owned(),
+            seconds: self.started.elapsed().as_secs_f64(),
+        });
+        self.started = Instant::now();
+    }
+}
+
+/// The similarity to start from, and which piece is the face.
+struct Start {
+    piece: usize,
+    to_head: Similarity3<f64>,
+    confidence: f64,
+    residual_mm: f64,
+}
+
+/// Chooses the piece that is the face, turns its winding outwards, and aligns it.
+fn align_face(
+    model: &FaceModel<'_>,
+    cleaned: &mut CleanMesh,
+    landmarks: &MatchedLandmarks,
+    options: &RegistrationOptions,
+) -> Result<Start, RegistrationError> {
+    let largest = cleaned.pieces[0].area;
+    let mut candidates: Vec<usize> = (0..cleaned.pieces.len())
+        .filter(|&k| {
+            let p = &cleaned.pieces[k];
+            p.sphere.is_none()
+                && p.area >= PIECE_SHARE * largest
+                && p.triangles.len() >= MIN_TRIANGLE_COUNT
+        })
+        .take(4)
+        .collect();
+    if candidates.is_empty() {
+        candidates.push(0);
+    }
+    let mut was_inside_out = vec![false; cleaned.pieces.len()];
+    for &k in &candidates {
+        if closed_volume(&cleaned.positions, &cleaned.pieces[k].triangles) < 0.0 {
+            was_inside_out[k] = true;
+            for t in &mut cleaned.pieces[k].triangles {
+                t.swap(1, 2);
+            }
+        }
+    }
+
+    let start = if landmarks.names.is_empty() {
+        let mut best: Option<Start> = None;
+        for &k in &candidates {
+            let piece = &cleaned.pieces[k];
+            let surface = Surface::new(&cleaned.positions, &piece.triangles)?;
+            let Some(found) = align(model, &cleaned.positions, &piece.triangles, &surface) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|b| found.residual_mm < b.residual_mm) {
+                best = Some(Start {
+                    piece: k,
+                    to_head: found.to_head,
+                    confidence: found.confidence,
+                    residual_mm: found.residual_mm,
+                });
+            }
+        }
+        let uncertain = |confidence| RegistrationError::AlignmentUncertain {
+            confidence,
+            threshold: options.min_confidence,
+            landmarks: useful_landmarks(model.template),
+        };
+        let best = best.ok_or_else(|| uncertain(0.0))?;
+        if best.confidence < options.min_confidence {
+            return Err(uncertain(best.confidence));
+        }
+        if best.residual_mm > MAX_RESIDUAL_MM {
+            return Err(uncertain(0.0));
+        }
+        best
+    } else {
+        let to_head = from_landmarks(model.template, landmarks)?;
+        // The face is the piece that the landmarks lie on.
+        let mut best = (f64::INFINITY, candidates[0]);
+        for &k in &candidates {
+            let surface = Surface::new(&cleaned.positions, &cleaned.pieces[k].triangles)?;
+            let sum: f64 = landmarks.face.iter().map(|p| surface.closest(p).distance).sum();
+            if sum < best.0 {
+                best = (sum, k);
+            }
+        }
+        Start {
+            piece: best.1,
+            to_head,
+            confidence: 1.0,
+            residual_mm: landmark_rms(model, landmarks, &to_head),
+        }
+    };
+    cleaned.report.was_inside_out = was_inside_out[start.piece];
+    Ok(start)
+}
+
+fn landmark_rms(
+    model: &FaceModel<'_>,
+    landmarks: &MatchedLandmarks,
+    to_head: &Similarity3<f64>,
+) -> f64 {
+    let sum: f64 = landmarks
+        .face
+        .iter()
+        .zip(&landmarks.vertices)
+        .map(|(p, &v)| {
+            (to_head.transform_point(p) - model.positions()[v as usize]).norm_squared()
+        })
+        .sum();
+    (sum / landmarks.names.len() as f64).sqrt()
+}
+
+/// The chosen piece alone, in the head frame.
+fn target_of(
+    cleaned: &CleanMesh,
+    piece: usize,
+    to_head: &Similarity3<f64>,
+) -> Result<Target, RegistrationError> {
+    let piece = &cleaned.pieces[piece];
+    let mut local = vec![u32::MAX; cleaned.positions.len()];
+    let positions = piece
+        .vertices
+        .iter()
+        .enumerate()
+        .map(|(k, &v)| {
+            local[v as usize] = k as u32;
+            to_head.transform_point(&cleaned.positions[v as usize])
+        })
+        .collect();
+    let triangles = piece.triangles.iter().map(|t| t.map(|v| local[v as usize])).collect();
+    Ok(Target::new(positions, triangles)?)
+}
+
+/// Landmarks and openings as pins.
+struct Pins {
+    landmarks: Vec<(u32, Point)>,
+}
+
+impl Pins {
+    fn new(landmarks: &MatchedLandmarks, to_head: &Similarity3<f64>) -> Self {
+        Self {
+            landmarks: landmarks
+                .vertices
+                .iter()
+                .zip(&landmarks.face)
+                .map(|(&v, p)| (v, to_head.transform_point(p)))
+                .collect(),
+        }
+    }
+
+    fn at(
+        &self,
+        model: &FaceModel<'_>,
+        openings: &[FaceOpening],
+        vertices: &[Point],
+        weight: f64,
+    ) -> Vec<Pin> {
+        let mut pins: Vec<Pin> = self
+            .landmarks
+            .iter()
+            .map(|&(vertex, place)| Pin {
+                vertex,
+                place,
+                weight: 4.0 * weight,
+            })
+            .collect();
+        pins.extend(opening_pins(model, openings, vertices, weight));
+        pins
+    }
+}
+
+/// From the frame of the first alignment to the head frame proper: eyes as far apart as the
+/// template's (or the unit that the user gave), turned and placed for the least distance
+/// between the registered face and the template's.
+fn true_size(
+    model: &FaceModel<'_>,
+    registered: &[Point],
+    to_head: &Similarity3<f64>,
+    options: &RegistrationOptions,
+) -> Similarity3<f64> {
+    let face: Vec<usize> =
+        (0..registered.len()).filter(|&v| model.roles[v] == Role::Face).collect();
+    let from: Vec<Point> = face.iter().map(|&v| registered[v]).collect();
+    let to: Vec<Point> = face.iter().map(|&v| model.positions()[v]).collect();
+    let weights = vec![1.0; face.len()];
+    let Some(fitted) = umeyama(&from, &to, &weights) else {
+        return Similarity3::identity();
+    };
+    let scale = match (options.unit_mm, &eye_centers(model, registered)[..]) {
+        (Some(unit), _) => unit / to_head.scaling(),
+        (None, [left, right]) => {
+            let own = (left.1 - right.1).norm();
+            let eyes = &model.template.eyes;
+            (eyes[0].center - eyes[1].center).norm() / own
+        }
+        _ => fitted.scaling(),
+    };
+    let rotation: UnitQuaternion<f64> = fitted.isometry.rotation;
+    let middle = |points: &[Point]| {
+        points.iter().map(|p| p.coords).sum::<crate::Vector>() / points.len() as f64
+    };
+    let translation = middle(&to) - rotation * middle(&from) * scale;
+    Similarity3::from_parts(Translation3::from(translation), rotation, scale)
+}
+
+fn warn(report: &CleaningReport, triangle_count: usize, warnings: &mut Vec<String>) {
+    if report.was_inside_out {
+        warnings.push(
+            "the face is wound inside out: its triangles are clockwise, or the mesh is a mirror \
+             image (then left and right are swapped)"
+                .to_owned(),
+        );
+    }
+    if report.non_manifold_edges > 0 {
+        warnings.push(format!(
+            "{} edges have more than two triangles",
+            report.non_manifold_edges
+        ));
+    }
+    if triangle_count < 1500 {
+        warnings.push(format!(
+            "the face has only {triangle_count} triangles: fine detail cannot be matched"
+        ));
+    }
+}

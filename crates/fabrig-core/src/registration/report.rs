@@ -1,0 +1,200 @@
+//! How well a face was registered, in millimetres at true head size.
+
+use serde::{Deserialize, Serialize};
+
+use super::clean::CleaningReport;
+use super::face_model::{FaceModel, Role};
+use super::target::Target;
+use crate::Point;
+use crate::mesh::{Surface, SurfaceError, triangle_normals, vertex_normals};
+
+/// Distances of a set of points. [mm]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct DistanceStatistics {
+    /// How many points were measured.
+    pub count: usize,
+    /// Median.
+    pub median: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// 95 % are below this.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl DistanceStatistics {
+    /// Of these distances; all zero for none.
+    pub fn from_distances(mut distances: Vec<f64>) -> Self {
+        if distances.is_empty() {
+            return Self::default();
+        }
+        distances.sort_by(f64::total_cmp);
+        let count = distances.len();
+        Self {
+            count,
+            median: distances[count / 2],
+            rms: (distances.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt(),
+            p95: distances[(count * 95 / 100).min(count - 1)],
+            max: distances[count - 1],
+        }
+    }
+}
+
+/// Time of one stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageTime {
+    /// Name of the stage.
+    pub stage: String,
+    /// Wall-clock time. [s]
+    pub seconds: f64,
+}
+
+/// Whether an opening of the template has a counterpart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OpeningState {
+    /// The mesh is open there: both sides are told apart.
+    Open,
+    /// One closed surface: both sides move as one and stretch when they part.
+    Fused,
+}
+
+/// What registration measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegistrationReport {
+    /// What cleaning found.
+    pub cleaning: CleaningReport,
+    /// Whether landmarks fixed the alignment.
+    pub used_landmarks: bool,
+    /// Margin of the alignment over the best one that differs, 0 to 1; 1 with landmarks.
+    pub confidence: f64,
+    /// Mean capped distance right after alignment, before the template was deformed. [mm]
+    pub alignment_residual_mm: f64,
+    /// Millimetres per unit of the user's mesh.
+    pub millimetres_per_unit: f64,
+    /// Distance of the template's face vertices from the user's surface, where covered.
+    pub template_to_face: DistanceStatistics,
+    /// Distance of the user's vertices from the template's face, where they lie on it.
+    pub face_to_template: DistanceStatistics,
+    /// Distance of the given landmarks from where they ended up, if any were given.
+    pub landmarks: Option<DistanceStatistics>,
+    /// Share of the template's face area that has a counterpart, 0 to 1.
+    pub coverage: f64,
+    /// Triangles of the template's face that turned against their surroundings.
+    pub folded_triangles: usize,
+    /// Smallest, 5 % and median quality of the face's triangles, 1 = equilateral, 0 = no area.
+    pub triangle_quality: [f64; 3],
+    /// The mouth, where the template has one.
+    pub mouth: OpeningState,
+    /// Left eye, right eye.
+    pub eyes: [OpeningState; 2],
+    /// Time of each stage.
+    pub times: Vec<StageTime>,
+    /// What a person should know, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl RegistrationReport {
+    /// Whether upper and lower lip are one surface in the user's mesh.
+    pub fn fused_mouth(&self) -> bool {
+        self.mouth == OpeningState::Fused
+    }
+
+    /// Whether upper and lower lid of an eye are one surface: left, right.
+    pub fn fused_eyes(&self) -> [bool; 2] {
+        self.eyes.map(|e| e == OpeningState::Fused)
+    }
+
+    /// Time of all stages. [s]
+    pub fn total_seconds(&self) -> f64 {
+        self.times.iter().map(|t| t.seconds).sum()
+    }
+}
+
+/// What is measured on the registered positions.
+pub(super) struct Measures {
+    pub(super) template_to_face: DistanceStatistics,
+    pub(super) face_to_template: DistanceStatistics,
+    pub(super) coverage: f64,
+    pub(super) folded_triangles: usize,
+    pub(super) triangle_quality: [f64; 3],
+}
+
+/// Distances beyond this mean that there is no counterpart. [mm]
+const COUNTERPART_MM: f64 = 6.0;
+
+/// Measures `registered` against the target.
+pub(super) fn measure(
+    model: &FaceModel<'_>,
+    target: &Target,
+    registered: &[Point],
+) -> Result<Measures, SurfaceError> {
+    let normals = vertex_normals(registered, &model.triangles);
+    let areas = crate::mesh::vertex_areas(registered, &model.triangles);
+    let cos_limit = 75f64.to_radians().cos();
+    let mut forth = Vec::new();
+    let (mut covered, mut total) = (0.0, 0.0);
+    for v in (0..registered.len()).filter(|&v| model.roles[v] == Role::Face) {
+        total += areas[v];
+        if let Some(m) = target.matching(&registered[v], &normals[v], COUNTERPART_MM, cos_limit) {
+            if !m.is_on_boundary {
+                covered += areas[v];
+                forth.push(m.place.distance);
+            }
+        }
+    }
+    let surface = Surface::new(registered, &model.triangles)?;
+    let back = target
+        .positions
+        .iter()
+        .zip(&target.normals)
+        .filter_map(|(p, n)| {
+            let at = surface.closest_where(p, COUNTERPART_MM, |at| {
+                surface.blend(at, &normals).dot(n) > 0.25
+            })?;
+            let is_face = model.triangles[at.triangle as usize]
+                .iter()
+                .all(|&v| model.roles[v as usize] == Role::Face);
+            is_face.then_some(at.distance)
+        })
+        .collect();
+
+    let mut folded_triangles = 0;
+    let mut qualities = Vec::new();
+    let unit = triangle_normals(registered, &model.triangles);
+    let unit_before = triangle_normals(model.positions(), &model.triangles);
+    for (k, t) in model.triangles.iter().enumerate() {
+        if t.iter().any(|&v| model.roles[v as usize] != Role::Face) {
+            continue;
+        }
+        let around = |positions_normals: &[crate::Vector]| -> crate::Vector {
+            t.iter().map(|&v| positions_normals[v as usize]).sum()
+        };
+        // Turned against its surroundings, and not so on the template itself.
+        if unit[k].dot(&around(&normals)) < 0.0 && unit_before[k].dot(&around(&model.normals)) > 0.0
+        {
+            folded_triangles += 1;
+        }
+        let [a, b, c] = t.map(|v| registered[v as usize]);
+        let sides = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
+        qualities.push(if sides > 0.0 {
+            // 4 sqrt(3) area / sum of squared sides.
+            2.0 * 3f64.sqrt() * unit[k].norm() / sides
+        } else {
+            0.0
+        });
+    }
+    qualities.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        let k = (qualities.len() as f64 * share) as usize;
+        qualities.get(k.min(qualities.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    };
+    Ok(Measures {
+        template_to_face: DistanceStatistics::from_distances(forth),
+        face_to_template: DistanceStatistics::from_distances(back),
+        coverage: if total > 0.0 { covered / total } else { 0.0 },
+        folded_triangles,
+        triangle_quality: [at(0.0), at(0.05), at(0.5)],
+    })
+}
