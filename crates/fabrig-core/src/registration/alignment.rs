@@ -46,7 +46,10 @@ pub(super) fn align(
     triangles: &[[u32; 3]],
     surface: &Surface,
 ) -> Option<Alignment> {
-    let (mut low, mut high) = (positions[triangles[0][0] as usize], positions[triangles[0][0] as usize]);
+    let (mut low, mut high) = (
+        positions[triangles[0][0] as usize],
+        positions[triangles[0][0] as usize],
+    );
     for &v in triangles.iter().flatten() {
         low = low.inf(&positions[v as usize]);
         high = high.sup(&positions[v as usize]);
@@ -134,24 +137,14 @@ fn keep(best: &mut Vec<Guess>, guess: Guess, count: usize) {
 }
 
 /// Puts the template's nose on `anchor`.
-fn place(
-    anchor: Point,
-    nose: Point,
-    turn: UnitQuaternion<f64>,
-    scale: f64,
-) -> Similarity3<f64> {
+fn place(anchor: Point, nose: Point, turn: UnitQuaternion<f64>, scale: f64) -> Similarity3<f64> {
     let translation = anchor.coords - turn * nose.coords * scale;
     Similarity3::from_parts(Translation3::from(translation), turn, scale)
 }
 
 /// Mean capped distance of template samples from the mesh, plus a penalty for normals that
 /// disagree. [mm]
-fn judge(
-    grid: &ClosestGrid,
-    samples: &[Sample],
-    from_head: &Similarity3<f64>,
-    limit: f64,
-) -> f64 {
+fn judge(grid: &ClosestGrid, samples: &[Sample], from_head: &Similarity3<f64>, limit: f64) -> f64 {
     let scale = from_head.scaling();
     let mut sum = 0.0;
     for s in samples {
@@ -243,7 +236,13 @@ fn distinct(
     let mut chosen: Vec<Guess> = Vec::new();
     for g in sorted {
         if chosen.iter().all(|c| {
-            differs(&c.from_head, &g.from_head, angle_degrees, distance_mm, scale_ratio)
+            differs(
+                &c.from_head,
+                &g.from_head,
+                angle_degrees,
+                distance_mm,
+                scale_ratio,
+            )
         }) {
             chosen.push(*g);
             if chosen.len() == count {
@@ -261,7 +260,11 @@ fn differs(
     distance_mm: f64,
     scale_ratio: f64,
 ) -> bool {
-    let angle = a.isometry.rotation.angle_to(&b.isometry.rotation).to_degrees();
+    let angle = a
+        .isometry
+        .rotation
+        .angle_to(&b.isometry.rotation)
+        .to_degrees();
     let ratio = (a.scaling() / b.scaling()).max(b.scaling() / a.scaling());
     // Compared at the middle of the face, where both place it best.
     let middle = Point::new(0.0, 0.0, 20.0);
@@ -392,9 +395,10 @@ fn similarity_step(pairs: &[(Point, Point, Vector)]) -> Option<Similarity3<f64>>
     }
     let x = a.cholesky()?.solve(&b);
     let turn = Vector::new(x[3], x[4], x[5]) / 100.0;
-    let rotation = Unit::try_new_and_get(turn, 1e-12).map_or_else(UnitQuaternion::identity, |(axis, angle)| {
-        UnitQuaternion::from_axis_angle(&axis, angle)
-    });
+    let rotation = Unit::try_new_and_get(turn, 1e-12)
+        .map_or_else(UnitQuaternion::identity, |(axis, angle)| {
+            UnitQuaternion::from_axis_angle(&axis, angle)
+        });
     let scale = (1.0 + x[6] / 100.0).clamp(0.8, 1.25);
     Some(Similarity3::from_parts(
         Translation3::new(x[0], x[1], x[2]),

@@ -93,8 +93,7 @@ pub(super) fn clean(mesh: &Mesh) -> CleanMesh {
     report.non_manifold_edges = topology.edges().iter().filter(|e| e.face_count > 2).count();
     report.flipped_triangles = agree_on_winding(&topology, &mut triangles);
 
-    let components =
-        Components::from_faces(positions.len(), triangles.iter().map(|t| &t[..]));
+    let components = Components::from_faces(positions.len(), triangles.iter().map(|t| &t[..]));
     let mut pieces: Vec<Piece> = components
         .vertices()
         .into_iter()
@@ -235,9 +234,11 @@ fn fit_sphere(points: impl Iterator<Item = Point>) -> Option<Sphere> {
     if points.len() < 12 {
         return None;
     }
-    let middle =
-        Point::from(points.iter().map(|p| p.coords).sum::<Vector>() / points.len() as f64);
-    let size = points.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max);
+    let middle = Point::from(points.iter().map(|p| p.coords).sum::<Vector>() / points.len() as f64);
+    let size = points
+        .iter()
+        .map(|p| (p - middle).norm())
+        .fold(0.0, f64::max);
     if size <= 0.0 {
         return None;
     }

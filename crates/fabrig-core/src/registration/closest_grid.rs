@@ -106,8 +106,8 @@ impl ClosestGrid {
     }
 
     fn offer(&mut self, [x, y, z]: [usize; 3], sample: u32) {
-        let center = self.low
-            + Vector::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5) * self.cell;
+        let center =
+            self.low + Vector::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5) * self.cell;
         let index = self.index(x, y, z);
         let held = self.nearest[index];
         if held == sample {

@@ -64,7 +64,9 @@ pub enum RegistrationError {
         landmarks: Vec<String>,
     },
     /// Too little is left after cleaning.
-    #[error("the face has {triangle_count} usable triangles after cleaning, at least {expected} are needed")]
+    #[error(
+        "the face has {triangle_count} usable triangles after cleaning, at least {expected} are needed"
+    )]
     TooFewTriangles {
         /// Triangles with an area, in the largest piece.
         triangle_count: usize,

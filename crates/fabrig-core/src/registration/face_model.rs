@@ -87,7 +87,12 @@ impl<'a> FaceModel<'a> {
         }
         let triangle_roles: Vec<Role> = triangles
             .iter()
-            .map(|t| t.map(|v| roles[v as usize]).into_iter().min().unwrap_or(Role::Hidden))
+            .map(|t| {
+                t.map(|v| roles[v as usize])
+                    .into_iter()
+                    .min()
+                    .unwrap_or(Role::Hidden)
+            })
             .collect();
         let openings = OpeningKind::ALL
             .into_iter()
@@ -140,7 +145,8 @@ impl<'a> FaceModel<'a> {
             .collect();
         let mut chosen = Vec::new();
         while chosen.len() < count.min(candidates.len()) {
-            let Some(k) = (0..candidates.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b]))
+            let Some(k) =
+                (0..candidates.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b]))
             else {
                 break;
             };
@@ -173,7 +179,14 @@ impl<'a> FaceModel<'a> {
 
 /// What a region's name says about its vertices.
 fn role_of(name: &str) -> Role {
-    const HIDDEN: [&str; 6] = ["mouth_interior", "socket", "nostril", "ear_canal", "interior", "inside"];
+    const HIDDEN: [&str; 6] = [
+        "mouth_interior",
+        "socket",
+        "nostril",
+        "ear_canal",
+        "interior",
+        "inside",
+    ];
     const OUTLYING: [&str; 4] = ["neck", "scalp", "ear", "nape"];
     if HIDDEN.iter().any(|h| name.starts_with(h)) {
         Role::Hidden
@@ -203,14 +216,14 @@ fn opening(template: &Template, topology: &Topology, kind: OpeningKind) -> Optio
         let mut vertices: Vec<u32> = (0..positions.len() as u32)
             .filter(|&v| {
                 regions.vertex_regions[v as usize] == side
-                    && topology
-                        .neighbours(v)
-                        .iter()
-                        .any(|&n| is_inside(n))
+                    && topology.neighbours(v).iter().any(|&n| is_inside(n))
             })
             .collect();
         vertices.sort_by(|&a, &b| {
-            positions[a as usize].x.total_cmp(&positions[b as usize].x).then(a.cmp(&b))
+            positions[a as usize]
+                .x
+                .total_cmp(&positions[b as usize].x)
+                .then(a.cmp(&b))
         });
         vertices
     };

@@ -39,7 +39,11 @@ pub(super) fn map_vertices(
         .iter()
         .map(|t| {
             let s = t.map(|v| vertex_sides[v as usize]);
-            if s[0] == s[1] || s[0] == s[2] { s[0] } else { s[1].filter(|_| s[1] == s[2]) }
+            if s[0] == s[1] || s[0] == s[2] {
+                s[0]
+            } else {
+                s[1].filter(|_| s[1] == s[2])
+            }
         })
         .collect();
     let closest = |v: usize, refused: Option<Side>| {

@@ -39,8 +39,10 @@ fn find_opening(opening: &Opening, target: &Target, vertices: &[Point]) -> Optio
         .boundary_loops
         .iter()
         .filter_map(|chain| {
-            let points: Vec<Point> =
-                chain.iter().map(|&v| target.positions[v as usize]).collect();
+            let points: Vec<Point> = chain
+                .iter()
+                .map(|&v| target.positions[v as usize])
+                .collect();
             let ratio = perimeter(&points) / length;
             let apart = (middle(&points) - center).norm();
             ((0.4..2.5).contains(&ratio) && apart < 0.35 * length).then_some((apart, points))
@@ -166,8 +168,12 @@ mod tests {
                 let found = split(OpeningKind::Mouth, &chain).expect("two lines");
                 assert!((found.upper[0].x + 20.0).abs() < 1e-9);
                 assert!((found.lower[0].x + 20.0).abs() < 1e-9);
-                assert!((at_fraction(&found.upper, 0.5) - Point::new(0.0, 5.0, 100.0)).norm() < 1e-9);
-                assert!((at_fraction(&found.lower, 0.5) - Point::new(0.0, -5.0, 100.0)).norm() < 1e-9);
+                assert!(
+                    (at_fraction(&found.upper, 0.5) - Point::new(0.0, 5.0, 100.0)).norm() < 1e-9
+                );
+                assert!(
+                    (at_fraction(&found.lower, 0.5) - Point::new(0.0, -5.0, 100.0)).norm() < 1e-9
+                );
             }
         }
     }

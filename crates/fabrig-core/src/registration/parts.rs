@@ -37,8 +37,11 @@ pub(super) fn recognise(
         if k == face_piece {
             continue;
         }
-        let points: Vec<Point> =
-            piece.vertices.iter().map(|&v| positions[v as usize]).collect();
+        let points: Vec<Point> = piece
+            .vertices
+            .iter()
+            .map(|&v| positions[v as usize])
+            .collect();
         let body = eye_of(&points, &eyes).or_else(|| mouth_part(model, &points, mouth_shift));
         if let Some(body) = body {
             let mut vertices: Vec<u32> = piece
@@ -54,14 +57,30 @@ pub(super) fn recognise(
 }
 
 /// Where the eyeballs of the registered face should be, with the template's radii, left first.
-pub(super) fn eye_centers(model: &FaceModel<'_>, registered: &[Point]) -> Vec<(RigidBody, Point, f64)> {
+pub(super) fn eye_centers(
+    model: &FaceModel<'_>,
+    registered: &[Point],
+) -> Vec<(RigidBody, Point, f64)> {
     let mut eyes = Vec::new();
     for (kind, body, eye) in [
-        (OpeningKind::LeftEye, RigidBody::EyeLeft, &model.template.eyes[0]),
-        (OpeningKind::RightEye, RigidBody::EyeRight, &model.template.eyes[1]),
+        (
+            OpeningKind::LeftEye,
+            RigidBody::EyeLeft,
+            &model.template.eyes[0],
+        ),
+        (
+            OpeningKind::RightEye,
+            RigidBody::EyeRight,
+            &model.template.eyes[1],
+        ),
     ] {
         if let Some(opening) = model.openings.iter().find(|o| o.kind == kind) {
-            let ring: Vec<u32> = opening.upper.iter().chain(&opening.lower).copied().collect();
+            let ring: Vec<u32> = opening
+                .upper
+                .iter()
+                .chain(&opening.lower)
+                .copied()
+                .collect();
             let shift = mean(registered, &ring) - mean(model.positions(), &ring);
             eyes.push((body, eye.center + shift, eye.radius));
         }
@@ -102,9 +121,9 @@ fn mouth_part(model: &FaceModel<'_>, points: &[Point], shift: Vector) -> Option<
         .flat_map(|p| p.mesh.positions().iter().map(|q| q + shift))
         .collect();
     let (low, high) = bounds(&all)?;
-    let inside = points.iter().all(|p| {
-        (0..3).all(|c| p[c] > low[c] - ROOM_MM && p[c] < high[c] + ROOM_MM)
-    });
+    let inside = points
+        .iter()
+        .all(|p| (0..3).all(|c| p[c] > low[c] - ROOM_MM && p[c] < high[c] + ROOM_MM));
     let (own_low, own_high) = bounds(points)?;
     let center = nalgebra::center(&own_low, &own_high);
     parts
@@ -112,7 +131,10 @@ fn mouth_part(model: &FaceModel<'_>, points: &[Point], shift: Vector) -> Option<
         .filter(|_| inside)
         .filter_map(|p| {
             let (low, high) = bounds(p.mesh.positions())?;
-            Some(((nalgebra::center(&low, &high) + shift - center).norm(), p.follows))
+            Some((
+                (nalgebra::center(&low, &high) + shift - center).norm(),
+                p.follows,
+            ))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, body)| body)
@@ -120,7 +142,11 @@ fn mouth_part(model: &FaceModel<'_>, points: &[Point], shift: Vector) -> Option<
 
 fn bounds(points: &[Point]) -> Option<(Point, Point)> {
     let first = *points.first()?;
-    Some(points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
+    Some(
+        points
+            .iter()
+            .fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))),
+    )
 }
 
 /// Mean position of some vertices.

@@ -224,7 +224,9 @@ struct Pull {
 /// (vertex, area it stands for), at most [`PULLING_COUNT`] of them.
 fn pulling_vertices(target: &Target) -> Vec<(u32, f64)> {
     let areas = vertex_areas(&target.positions, &target.triangles);
-    let used: Vec<u32> = (0..areas.len() as u32).filter(|&v| areas[v as usize] > 0.0).collect();
+    let used: Vec<u32> = (0..areas.len() as u32)
+        .filter(|&v| areas[v as usize] > 0.0)
+        .collect();
     let stride = used.len().div_ceil(PULLING_COUNT).max(1);
     used.into_iter()
         .step_by(stride)

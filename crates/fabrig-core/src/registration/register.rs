@@ -16,10 +16,10 @@ use super::nonrigid_icp::{Pin, deform_coarse};
 use super::openings::{FaceOpening, find_openings, opening_pins};
 use super::parts::{RigidComponent, eye_centers, recognise};
 use super::refinement::refine;
-use super::report::{
-    DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure,
+use super::report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure};
+use super::similarity::{
+    MatchedLandmarks, from_landmarks, match_landmarks, umeyama, useful_landmarks,
 };
-use super::similarity::{MatchedLandmarks, from_landmarks, match_landmarks, umeyama, useful_landmarks};
 use super::target::Target;
 use super::{CleaningReport, RegistrationError};
 use crate::Point;
@@ -156,10 +156,15 @@ pub fn register(
     clock.step("map", 0.9)?;
     let to_true_size = true_size(&model, &refined, &start.to_head, options);
     let to_head = to_true_size * start.to_head;
-    let positions: Vec<Point> =
-        refined.iter().map(|p| to_true_size.transform_point(p)).collect();
-    let face_positions: Vec<Point> =
-        face.positions().iter().map(|p| to_head.transform_point(p)).collect();
+    let positions: Vec<Point> = refined
+        .iter()
+        .map(|p| to_true_size.transform_point(p))
+        .collect();
+    let face_positions: Vec<Point> = face
+        .positions()
+        .iter()
+        .map(|p| to_head.transform_point(p))
+        .collect();
     let mut triangles = face.triangles();
     if cleaned.report.was_inside_out {
         for t in &mut triangles {
@@ -169,10 +174,12 @@ pub fn register(
     let normals = vertex_normals(&face_positions, &triangles);
     let (face_points, face_regions) =
         map_vertices(&model, face, &face_positions, &normals, &positions)?;
-    let clean_positions: Vec<Point> =
-        cleaned.positions.iter().map(|p| to_head.transform_point(p)).collect();
-    let rigid_components =
-        recognise(&model, &cleaned, start.piece, &clean_positions, &positions);
+    let clean_positions: Vec<Point> = cleaned
+        .positions
+        .iter()
+        .map(|p| to_head.transform_point(p))
+        .collect();
+    let rigid_components = recognise(&model, &cleaned, start.piece, &clean_positions, &positions);
     clock.finish("map");
 
     let target = target_of(&cleaned, start.piece, &to_head)?;
@@ -323,7 +330,10 @@ fn align_face(
             let Some(found) = align(model, &cleaned.positions, &piece.triangles, &surface) else {
                 continue;
             };
-            if best.as_ref().is_none_or(|b| found.residual_mm < b.residual_mm) {
+            if best
+                .as_ref()
+                .is_none_or(|b| found.residual_mm < b.residual_mm)
+            {
                 best = Some(Start {
                     piece: k,
                     to_head: found.to_head,
@@ -351,7 +361,11 @@ fn align_face(
         let mut best = (f64::INFINITY, candidates[0]);
         for &k in &candidates {
             let surface = Surface::new(&cleaned.positions, &cleaned.pieces[k].triangles)?;
-            let sum: f64 = landmarks.face.iter().map(|p| surface.closest(p).distance).sum();
+            let sum: f64 = landmarks
+                .face
+                .iter()
+                .map(|p| surface.closest(p).distance)
+                .sum();
             if sum < best.0 {
                 best = (sum, k);
             }
@@ -376,9 +390,7 @@ fn landmark_rms(
         .face
         .iter()
         .zip(&landmarks.vertices)
-        .map(|(p, &v)| {
-            (to_head.transform_point(p) - model.positions()[v as usize]).norm_squared()
-        })
+        .map(|(p, &v)| (to_head.transform_point(p) - model.positions()[v as usize]).norm_squared())
         .sum();
     (sum / landmarks.names.len() as f64).sqrt()
 }
@@ -400,7 +412,11 @@ fn target_of(
             to_head.transform_point(&cleaned.positions[v as usize])
         })
         .collect();
-    let triangles = piece.triangles.iter().map(|t| t.map(|v| local[v as usize])).collect();
+    let triangles = piece
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| local[v as usize]))
+        .collect();
     Ok(Target::new(positions, triangles)?)
 }
 
@@ -451,8 +467,9 @@ fn true_size(
     to_head: &Similarity3<f64>,
     options: &RegistrationOptions,
 ) -> Similarity3<f64> {
-    let face: Vec<usize> =
-        (0..registered.len()).filter(|&v| model.roles[v] == Role::Face).collect();
+    let face: Vec<usize> = (0..registered.len())
+        .filter(|&v| model.roles[v] == Role::Face)
+        .collect();
     let from: Vec<Point> = face.iter().map(|&v| registered[v]).collect();
     let to: Vec<Point> = face.iter().map(|&v| model.positions()[v]).collect();
     let weights = vec![1.0; face.len()];

@@ -188,7 +188,10 @@ pub(super) fn measure(
     qualities.sort_by(f64::total_cmp);
     let at = |share: f64| {
         let k = (qualities.len() as f64 * share) as usize;
-        qualities.get(k.min(qualities.len().saturating_sub(1))).copied().unwrap_or(0.0)
+        qualities
+            .get(k.min(qualities.len().saturating_sub(1)))
+            .copied()
+            .unwrap_or(0.0)
     };
     Ok(Measures {
         template_to_face: DistanceStatistics::from_distances(forth),

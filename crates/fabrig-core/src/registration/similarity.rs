@@ -35,7 +35,12 @@ pub(super) fn umeyama(from: &[Point], to: &[Point], weights: &[f64]) -> Option<S
         return None;
     }
     let mean = |points: &[Point]| {
-        points.iter().zip(weights).map(|(p, w)| p.coords * *w).sum::<Vector>() / sum
+        points
+            .iter()
+            .zip(weights)
+            .map(|(p, w)| p.coords * *w)
+            .sum::<Vector>()
+            / sum
     };
     let (from_mean, to_mean) = (mean(from), mean(to));
     let mut covariance = Matrix3::zeros();
@@ -131,7 +136,11 @@ pub(super) fn from_landmarks(
         found: matched.names.len(),
     };
     let straight = umeyama(&matched.face, &to, &weights).ok_or_else(degenerate)?;
-    let flipped: Vec<Point> = matched.face.iter().map(|p| Point::new(-p.x, p.y, p.z)).collect();
+    let flipped: Vec<Point> = matched
+        .face
+        .iter()
+        .map(|p| Point::new(-p.x, p.y, p.z))
+        .collect();
     let mirrored = umeyama(&flipped, &to, &weights).ok_or_else(degenerate)?;
     let rms = |s: &Similarity3<f64>, from: &[Point]| {
         let sum: f64 = from
@@ -167,8 +176,7 @@ pub(super) fn useful_landmarks(template: &Template) -> Vec<String> {
 }
 
 fn nearest_names<'a>(name: &str, known: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut scored: Vec<(usize, &String)> =
-        known.map(|k| (edit_distance(name, k), k)).collect();
+    let mut scored: Vec<(usize, &String)> = known.map(|k| (edit_distance(name, k), k)).collect();
     scored.sort();
     scored.into_iter().take(3).map(|(_, k)| k.clone()).collect()
 }
