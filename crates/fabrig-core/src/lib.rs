@@ -23,6 +23,7 @@ pub mod atomic_file;
 pub mod facs;
 pub mod mesh;
 pub mod registration;
+pub mod recording;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod skin;

@@ -5,7 +5,7 @@ use std::path::Path;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, Frame, ImageBuffer, Rgba};
 
-use super::image_buffer::write_renamed;
+use super::image_buffer::write_whole;
 use super::sheet::check_same_size;
 use super::{Image, RenderError};
 
@@ -28,7 +28,7 @@ pub fn write_gif(
     }
     check_same_size(frames)?;
     let hundredths = (frame_secs * 100.0).round().clamp(1.0, 6000.0) as u32;
-    write_renamed(path.as_ref(), |out| {
+    write_whole(path.as_ref(), |out| {
         let mut encoder = GifEncoder::new_with_speed(out, 10);
         encoder.set_repeat(Repeat::Infinite)?;
         for frame in frames {

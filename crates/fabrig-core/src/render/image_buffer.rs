@@ -1,6 +1,6 @@
-//! Pixels: a finished picture, written with a rename so that no half file is left.
+//! Pixels: a finished picture, written whole or not at all.
 
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use embedded_graphics::Pixel;
@@ -10,6 +10,7 @@ use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::RenderError;
+use crate::atomic_file::write_atomically;
 
 /// Longest side of a picture. [pixels]
 const SIDE_LIMIT: u32 = 16_384;
@@ -88,7 +89,7 @@ impl Image {
     /// [`RenderError::Write`], [`RenderError::Encode`].
     pub fn save_png(&self, path: impl AsRef<Path>) -> Result<(), RenderError> {
         let path = path.as_ref();
-        write_renamed(path, |out| {
+        write_whole(path, |out| {
             PngEncoder::new(out).write_image(
                 &self.pixels,
                 self.width,
@@ -110,45 +111,30 @@ pub(super) fn check_size(width: u32, height: u32) -> Result<(), RenderError> {
     Ok(())
 }
 
-/// Encodes into a temporary file beside `path` and renames it when it is whole.
-pub(super) fn write_renamed(
+/// Encodes into a file that appears whole or not at all.
+pub(super) fn write_whole(
     path: &Path,
     encode: impl FnOnce(&mut dyn Write) -> Result<(), image::ImageError>,
 ) -> Result<(), RenderError> {
-    let write_error = |source| RenderError::Write {
-        path: path.to_owned(),
-        source,
-    };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::Builder::new()
-        .prefix(".picture")
-        .tempfile_in(folder)
-        .map_err(write_error)?;
-    let mut out = BufWriter::new(file.as_file_mut());
-    encode(&mut out).map_err(|source| RenderError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
-    out.flush().map_err(write_error)?;
-    drop(out);
-    make_readable(file.as_file()).map_err(write_error)?;
-    file.persist(path).map_err(|e| write_error(e.error))?;
-    Ok(())
+    write_atomically(path, |out| encode(out).map_err(Failure::Encode)).map_err(|failure| {
+        let path = path.to_owned();
+        match failure {
+            Failure::Write(source) => RenderError::Write { path, source },
+            Failure::Encode(source) => RenderError::Encode { path, source },
+        }
+    })
 }
 
-/// Temporary files are private to their owner; a picture is for everyone who may read.
-#[cfg(unix)]
-fn make_readable(file: &std::fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+/// What can fail before the file's name is known.
+enum Failure {
+    Write(std::io::Error),
+    Encode(image::ImageError),
 }
 
-#[cfg(not(unix))]
-fn make_readable(_: &std::fs::File) -> std::io::Result<()> {
-    Ok(())
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self::Write(error)
+    }
 }
 
 impl OriginDimensions for Image {
