@@ -22,8 +22,8 @@ pub mod anatomy;
 pub mod atomic_file;
 pub mod facs;
 pub mod mesh;
-pub mod registration;
 pub mod recording;
+pub mod registration;
 #[cfg(feature = "render")]
 pub mod render;
 pub mod skin;
