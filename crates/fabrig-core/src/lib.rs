@@ -22,6 +22,7 @@ pub mod anatomy;
 pub mod atomic_file;
 pub mod facs;
 pub mod mesh;
+pub mod motion;
 pub mod recording;
 pub mod registration;
 #[cfg(feature = "render")]
