@@ -20,6 +20,7 @@
 
 pub mod anatomy;
 pub mod atomic_file;
+pub mod cloth;
 pub mod facs;
 pub mod mesh;
 pub mod motion;

@@ -1,0 +1,232 @@
+//! Stretch and compression along grid edges.
+//!
+//! `C = |x_i - x_j| - l`, with one compliance where the edge is longer than `l` and another
+//! where it is shorter. The rest length moves with the target:
+//! `l(t) = l_0 + b_e (|X_i - X_j|(t) - l_0)`, where `l_0` is the neutral length and `b_e` is
+//! [`rest_blend`](crate::cloth::ClothOptions::rest_blend), varied a little from edge to edge
+//! (the rest imperfection). With `b = 0` a contracted muscle keeps its neutral length and
+//! wrinkles (the paper); with `b = 1` its target shape is free of stress. Within a frame the
+//! rest length goes straight from that of the frame's start to that of its end.
+//!
+//! Damping is along the gradient and relative to the target's own motion, so that it resists
+//! vibration without holding the cloth back behind a moving shape.
+//!
+//! Source: Macklin, Müller & Chentanez 2016, *XPBD*, eqs. 18 and 26, with no multiplier
+//! carried over, as there is one sweep per substep; separate compression as in nCloth.
+
+use crate::cloth::lanes::{Real, Vec3};
+
+/// Lengths below this are taken for this. [mm]
+const SHORTEST: f64 = 1e-12;
+
+/// Rest lengths of a set of edges over one frame. [mm]
+#[derive(Debug, Clone)]
+pub(crate) struct RestLengths<R> {
+    /// Length in the neutral shape.
+    neutral: Vec<R>,
+    /// Rest length at the start of the frame.
+    start: Vec<R>,
+    /// Rest length at the end of the frame.
+    end: Vec<R>,
+    /// How far the rest length follows the target, 0 = not at all, 1 = wholly.
+    blend: Vec<R>,
+}
+
+impl<R: Real> RestLengths<R> {
+    /// Lengths of `edges` in the neutral shape, with the blend of each edge.
+    pub(crate) fn new(neutral: &[Vec3<R>], edges: &[[usize; 2]], blend: Vec<R>) -> Self {
+        let lengths: Vec<R> = edges
+            .iter()
+            .map(|&[i, j]| edge_length(neutral[i], neutral[j]))
+            .collect();
+        Self {
+            start: lengths.clone(),
+            end: lengths.clone(),
+            neutral: lengths,
+            blend,
+        }
+    }
+
+    /// Starts a frame in whose end an edge's target has length `target`. Returns how far the
+    /// rest length will then be from it.
+    #[inline(always)]
+    pub(crate) fn begin_frame(&mut self, edge: usize, target: R) -> R {
+        let neutral = self.neutral[edge];
+        let rest = neutral + self.blend[edge] * (target - neutral);
+        self.start[edge] = self.end[edge];
+        self.end[edge] = rest;
+        target - rest
+    }
+
+    /// Forgets motion: from now on rest lengths are those at the end of the frame.
+    pub(crate) fn hold(&mut self) {
+        self.start.copy_from_slice(&self.end);
+    }
+
+    /// Rest length at `progress` (0 to 1) through the frame.
+    #[inline(always)]
+    pub(crate) fn at(&self, edge: usize, progress: R) -> R {
+        self.start[edge] + progress * (self.end[edge] - self.start[edge])
+    }
+}
+
+/// Distance of two points by the very operations that the projection uses, so that an edge at
+/// rest has exactly zero strain.
+#[inline(always)]
+pub(crate) fn edge_length<R: Real>(a: Vec3<R>, b: Vec3<R>) -> R {
+    let d = a - b;
+    d.dot(d).sqrt()
+}
+
+/// Compliances of distance constraints in one substep.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StretchCompliance<R> {
+    /// 1/(k h_e^2) where the edge is too long. [1/mass]
+    pub(crate) stretch: R,
+    /// 1/(k h_e^2) where it is too short. [1/mass]
+    pub(crate) compression: R,
+    /// Damping of the constraint relative to its stiffness, beta/(k h_e).
+    pub(crate) gamma: R,
+}
+
+/// Projects one edge.
+///
+/// - `a`, `b`: positions [mm]; `wa`, `wb`: inverse masses [1/mass]
+/// - `rest`: l [mm]
+/// - `resting`: a - b had both moved with their targets only [mm]; damping acts on the
+///   difference to it
+///
+/// Returns the corrections of a and b [mm]: zero for coincident points, whose direction is
+/// undefined.
+#[inline(always)]
+pub(crate) fn project_edge<R: Real>(
+    a: Vec3<R>,
+    b: Vec3<R>,
+    wa: R,
+    wb: R,
+    rest: R,
+    resting: Vec3<R>,
+    compliance: &StretchCompliance<R>,
+) -> (Vec3<R>, Vec3<R>) {
+    let d = a - b;
+    let length = d.dot(d).sqrt();
+    let inverse = R::splat(1.0) / length.max(R::splat(SHORTEST));
+    let c = length - rest;
+    let alpha = R::select_less(c, R::splat(0.0), compliance.compression, compliance.stretch);
+    let rate = d.dot(d - resting) * inverse;
+    let bottom = (wa + wb) * (R::splat(1.0) + compliance.gamma) + alpha;
+    // Minus the multiplier over the length, so that `d` need not be normalized.
+    let s = (c + compliance.gamma * rate) * inverse / bottom;
+    (d * -(s * wa), d * (s * wb))
+}
+
+/// Energy of one edge, `k C^2 / 2`, split into stretch and compression.
+#[inline(always)]
+pub(crate) fn edge_energy<R: Real>(a: Vec3<R>, b: Vec3<R>, rest: R, k: [R; 2]) -> [R; 2] {
+    let zero = R::splat(0.0);
+    let c = edge_length(a, b) - rest;
+    let half = R::splat(0.5) * c * c;
+    [
+        R::select_less(zero, c, half * k[0], zero),
+        R::select_less(c, zero, half * k[1], zero),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Vec3<f64> = Vec3 {
+        x: 1.0,
+        y: 2.0,
+        z: -0.5,
+    };
+    const B: Vec3<f64> = Vec3 {
+        x: 2.5,
+        y: 1.0,
+        z: 0.25,
+    };
+
+    fn compliance(stretch: f64, compression: f64, gamma: f64) -> StretchCompliance<f64> {
+        StretchCompliance {
+            stretch,
+            compression,
+            gamma,
+        }
+    }
+
+    #[test]
+    fn the_correction_is_the_implicit_step_down_the_energy_gradient() {
+        // One XPBD projection of a lone constraint solves its linearized implicit step:
+        // dx = -w grad E(x + dx), with grad by central differences of the energy.
+        let (wa, wb, k, rest) = (0.8, 0.3, 7.0, 1.5);
+        let (da, db) = project_edge(
+            A,
+            B,
+            wa,
+            wb,
+            rest,
+            A - B,
+            &compliance(1.0 / k, 1.0 / k, 0.0),
+        );
+        let energy = |a: Vec3<f64>| edge_energy(a, B + db, rest, [k, k]).iter().sum::<f64>();
+        let step = 1e-6;
+        for axis in 0..3 {
+            let mut e = [0.0; 3];
+            e[axis] = step;
+            let e = Vec3::splat(e);
+            let gradient = (energy(A + da + e) - energy(A + da - e)) / (2.0 * step);
+            let moved = da.lane(0)[axis];
+            assert!(
+                (moved + wa * gradient).abs() < 1e-8,
+                "axis {axis}: {moved} against {}",
+                -wa * gradient
+            );
+        }
+    }
+
+    #[test]
+    fn momentum_is_kept_and_a_rigid_edge_ends_at_its_rest_length() {
+        let (da, db) = project_edge(A, B, 0.5, 2.0, 1.0, A - B, &compliance(0.0, 0.0, 0.0));
+        assert!((edge_length(A + da, B + db) - 1.0).abs() < 1e-12);
+        let momentum = da * (1.0 / 0.5) + db * (1.0 / 2.0);
+        assert!(momentum.dot(momentum).sqrt() < 1e-14);
+    }
+
+    #[test]
+    fn compression_has_its_own_compliance() {
+        let long = edge_length(A, B) + 1.0;
+        let soft = f64::INFINITY;
+        let (da, _) = project_edge(A, B, 1.0, 1.0, long, A - B, &compliance(0.0, soft, 0.0));
+        assert_eq!(da.dot(da), 0.0);
+        let (da, _) = project_edge(A, B, 1.0, 1.0, 0.5, A - B, &compliance(0.0, soft, 0.0));
+        assert!(da.dot(da) > 0.0);
+    }
+
+    #[test]
+    fn damping_opposes_the_change_of_length_only() {
+        let d = A - B;
+        let rest = edge_length(A, B);
+        let c = compliance(0.1, 0.1, 0.5);
+        let sideways = d.cross(Vec3::splat([0.0, 0.0, 1.0]));
+        let (da, _) = project_edge(A, B, 1.0, 1.0, rest, d - sideways, &c);
+        assert!(da.dot(da).sqrt() < 1e-12, "no force across the edge");
+        let (da, _) = project_edge(A, B, 1.0, 1.0, rest, d * 0.9, &c);
+        assert!(da.dot(d) < 0.0, "a lengthening edge is pulled back");
+    }
+
+    #[test]
+    fn coincident_and_nearly_coincident_points_get_finite_corrections() {
+        for offset in [0.0, 1e-30, 1e-12, 1e-6] {
+            let b = A + Vec3::splat([offset, 0.0, 0.0]);
+            let (da, db) = project_edge(A, b, 1.0, 1.0, 1.0, A - b, &compliance(0.0, 0.0, 0.1));
+            for v in [da, db] {
+                let length = v.dot(v).sqrt();
+                assert!(
+                    length.is_finite() && length <= 0.5 + 1e-9,
+                    "{offset}: {length}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! Lane types: one text of every kernel for scalars and for several patches at once.
+//!
+//! A kernel written over [`Real`] runs on `f64` (the reference), on `f32`, and on
+//! [`Lanes`], where lane k belongs to the k-th patch of a group (lane per patch: the patches
+//! of a group share their grid, so no lane ever needs another lane's neighbour, and nothing
+//! is gathered).
+//!
+//! Only IEEE-exact operations are used (+, -, *, /, square root, comparison; never a fused
+//! multiply-add or an approximate reciprocal), so a patch has the same bits whatever lane,
+//! lane width, or instruction set it runs on.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A number, or several in the lanes of a register.
+pub(crate) trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// How many lanes there are.
+    const LANES: usize;
+
+    /// The same value in every lane.
+    fn splat(value: f64) -> Self;
+
+    /// Value of one lane.
+    fn lane(self, lane: usize) -> f64;
+
+    /// Replaces the value of one lane.
+    fn set_lane(&mut self, lane: usize, value: f64);
+
+    /// Square root, lane by lane.
+    fn sqrt(self) -> Self;
+
+    /// The larger value, lane by lane.
+    fn max(self, other: Self) -> Self;
+
+    /// `if a < b { yes } else { no }`, lane by lane.
+    fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self;
+}
+
+macro_rules! scalar_real {
+    ($scalar:ty) => {
+        impl Real for $scalar {
+            const LANES: usize = 1;
+
+            #[inline(always)]
+            fn splat(value: f64) -> Self {
+                value as $scalar
+            }
+
+            #[inline(always)]
+            fn lane(self, _lane: usize) -> f64 {
+                f64::from(self)
+            }
+
+            #[inline(always)]
+            fn set_lane(&mut self, _lane: usize, value: f64) {
+                *self = value as $scalar;
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$scalar>::sqrt(self)
+            }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self < other { other } else { self }
+            }
+
+            #[inline(always)]
+            fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self {
+                if a < b { yes } else { no }
+            }
+        }
+    };
+}
+
+scalar_real!(f32);
+scalar_real!(f64);
+
+/// `N` single-precision lanes. Arithmetic is written as plain loops over the lanes, which the
+/// compiler turns into register operations of the instruction set that the caller enabled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(32))]
+pub(crate) struct Lanes<const N: usize>(pub(crate) [f32; N]);
+
+macro_rules! lane_operator {
+    ($trait:ident, $method:ident, $operator:tt) => {
+        impl<const N: usize> $trait for Lanes<N> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let mut out = [0.0; N];
+                for lane in 0..N {
+                    out[lane] = self.0[lane] $operator other.0[lane];
+                }
+                Self(out)
+            }
+        }
+    };
+}
+
+lane_operator!(Add, add, +);
+lane_operator!(Sub, sub, -);
+lane_operator!(Mul, mul, *);
+lane_operator!(Div, div, /);
+
+impl<const N: usize> Neg for Lanes<N> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|value| -value))
+    }
+}
+
+impl<const N: usize> AddAssign for Lanes<N> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const N: usize> SubAssign for Lanes<N> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<const N: usize> Real for Lanes<N> {
+    const LANES: usize = N;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value as f32; N])
+    }
+
+    #[inline(always)]
+    fn lane(self, lane: usize) -> f64 {
+        f64::from(self.0[lane])
+    }
+
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, value: f64) {
+        self.0[lane] = value as f32;
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let mut out = [0.0; N];
+        for lane in 0..N {
+            out[lane] = self.0[lane].sqrt();
+        }
+        Self(out)
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::select_less(self, other, other, self)
+    }
+
+    #[inline(always)]
+    fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self {
+        let mut out = [0.0; N];
+        for lane in 0..N {
+            out[lane] = if a.0[lane] < b.0[lane] {
+                yes.0[lane]
+            } else {
+                no.0[lane]
+            };
+        }
+        Self(out)
+    }
+}
+
+/// A vector of three [`Real`]s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
+pub(crate) struct Vec3<R> {
+    /// First component.
+    pub(crate) x: R,
+    /// Second component.
+    pub(crate) y: R,
+    /// Third component.
+    pub(crate) z: R,
+}
+
+impl<R: Real> Vec3<R> {
+    /// From three components.
+    #[inline(always)]
+    pub(crate) fn new(x: R, y: R, z: R) -> Self {
+        Self { x, y, z }
+    }
+
+    /// The same vector in every lane.
+    #[inline(always)]
+    pub(crate) fn splat(v: [f64; 3]) -> Self {
+        Self::new(R::splat(v[0]), R::splat(v[1]), R::splat(v[2]))
+    }
+
+    /// Zero in every lane.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        Self::splat([0.0; 3])
+    }
+
+    /// Scalar product.
+    #[inline(always)]
+    pub(crate) fn dot(self, other: Self) -> R {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Vector product.
+    #[inline(always)]
+    pub(crate) fn cross(self, other: Self) -> Self {
+        Self::new(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+    }
+
+    /// Value of one lane.
+    #[inline(always)]
+    pub(crate) fn lane(self, lane: usize) -> [f64; 3] {
+        [self.x.lane(lane), self.y.lane(lane), self.z.lane(lane)]
+    }
+
+    /// Replaces the value of one lane.
+    #[inline(always)]
+    pub(crate) fn set_lane(&mut self, lane: usize, v: [f64; 3]) {
+        self.x.set_lane(lane, v[0]);
+        self.y.set_lane(lane, v[1]);
+        self.z.set_lane(lane, v[2]);
+    }
+}
+
+impl<R: Real> Add for Vec3<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self::new(self.x + o.x, self.y + o.y, self.z + o.z)
+    }
+}
+
+impl<R: Real> Sub for Vec3<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self::new(self.x - o.x, self.y - o.y, self.z - o.z)
+    }
+}
+
+impl<R: Real> Mul<R> for Vec3<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, s: R) -> Self {
+        Self::new(self.x * s, self.y * s, self.z * s)
+    }
+}
+
+impl<R: Real> AddAssign for Vec3<R> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+
+impl<R: Real> SubAssign for Vec3<R> {
+    #[inline(always)]
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lane_does_what_a_scalar_does() {
+        let a = [1.5_f32, -2.0, 0.3, 7.0];
+        let b = [0.1_f32, 3.0, -0.7, 7.0];
+        let (la, lb) = (Lanes(a), Lanes(b));
+        for lane in 0..4 {
+            let scalars = [
+                a[lane] + b[lane],
+                a[lane] - b[lane],
+                a[lane] * b[lane],
+                a[lane] / b[lane],
+                -a[lane],
+                (a[lane] * a[lane]).sqrt(),
+                a[lane].max(b[lane]),
+                if a[lane] < b[lane] { 1.0 } else { 2.0 },
+            ];
+            let lanes = [
+                la + lb,
+                la - lb,
+                la * lb,
+                la / lb,
+                -la,
+                (la * la).sqrt(),
+                la.max(lb),
+                Real::select_less(la, lb, Lanes::splat(1.0), Lanes::splat(2.0)),
+            ];
+            for (scalar, l) in scalars.iter().zip(lanes) {
+                assert_eq!(scalar.to_bits(), l.0[lane].to_bits());
+            }
+        }
+    }
+
+    #[test]
+    fn the_vector_product_is_orthogonal_and_right_handed() {
+        let x = Vec3::<f64>::splat([1.0, 0.0, 0.0]);
+        let y = Vec3::<f64>::splat([0.0, 1.0, 0.0]);
+        assert_eq!(x.cross(y), Vec3::splat([0.0, 0.0, 1.0]));
+    }
+}
