@@ -1,8 +1,8 @@
-//! Looks at a mesh: renders an OBJ file to a PNG.
+//! Looks at a mesh, the template (`template`) or a recording's first frame: renders a PNG.
 //!
 //! ```text
 //! cargo run --release -p fabrig-core --features render --example look -- MESH.obj OUT.png \
-//!     [--view front,three_quarter,side] [--size 640] [--edges] [--focus X,Y,Z,R]
+//!     [--view front+three_quarter+side] [--size 640] [--edges] [--focus X,Y,Z,R]
 //! ```
 //!
 //! Several views, separated by `+`, stand side by side. `--focus` frames a ball in place of
@@ -11,8 +11,13 @@
 use std::error::Error;
 
 use fabrig_core::Point;
-use fabrig_core::mesh::{Mesh, Polygons};
-use fabrig_core::render::{Edges, FaceLook, Picture, Sheet, View, mesh_layers};
+use fabrig_core::mesh::io::read_mesh;
+use fabrig_core::recording::RecordingReader;
+use fabrig_core::render::{
+    Edges, FaceLook, Picture, RecordingContent, Sheet, View, mesh_layers, recording_layers,
+    template_layers,
+};
+use fabrig_core::template::human;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut files = Vec::new();
@@ -45,8 +50,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input, output] = &files[..] else {
         return Err("usage: look MESH.obj OUT.png [--view a+b] [--size N] [--edges]".into());
     };
-    let mesh = read_obj(input)?;
-    let mut layers = mesh_layers(&mesh, &FaceLook::default())?;
+    let look = FaceLook::default();
+    let mut layers = if input == "template" {
+        template_layers(human(), &look)?
+    } else if input.ends_with(".mcap") {
+        let frame = RecordingReader::with_recovery(input)?.next_frame()?;
+        let frame = frame.ok_or("the recording has no frame")?;
+        recording_layers(&frame, &frame, RecordingContent::Both, &look)?
+    } else {
+        mesh_layers(&read_mesh(input)?, &look)?
+    };
     if has_edges {
         layers = layers
             .into_iter()
@@ -64,34 +77,4 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     sheet.compose(views.len() as u32)?.save_png(output)?;
     Ok(())
-}
-
-/// Vertices and faces of an OBJ file; everything else is passed over.
-fn read_obj(path: &str) -> Result<Mesh, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let mut positions = Vec::new();
-    let mut polygons = Polygons::new();
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let c: Vec<f64> = words.take(3).map(str::parse).collect::<Result<_, _>>()?;
-                let [x, y, z] = c[..] else {
-                    return Err(format!("bad vertex: {line}").into());
-                };
-                positions.push(Point::new(x, y, z));
-            }
-            Some("f") => {
-                let mut corners = Vec::new();
-                for word in words {
-                    let index: i64 = word.split('/').next().unwrap_or("").parse()?;
-                    let from_end = positions.len() as i64 + index;
-                    corners.push(u32::try_from(if index < 0 { from_end } else { index - 1 })?);
-                }
-                polygons.push(&corners);
-            }
-            _ => {}
-        }
-    }
-    Ok(Mesh::new(positions, polygons)?)
 }

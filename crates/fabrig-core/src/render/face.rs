@@ -22,7 +22,7 @@ pub struct FaceLook {
 impl Default for FaceLook {
     fn default() -> Self {
         Self {
-            skin: [224, 172, 147],
+            skin: [216, 164, 140],
             iris: [86, 116, 128],
             teeth: [238, 232, 218],
             tongue: [190, 96, 92],

@@ -44,8 +44,8 @@ impl Material {
     };
     /// Living skin.
     pub const SKIN: Self = Self {
-        roughness: 0.42,
-        specular: 0.035,
+        roughness: 0.5,
+        specular: 0.028,
         wrap: [0.42, 0.22, 0.16],
     };
     /// Wet and hard: eyes, teeth.

@@ -30,8 +30,8 @@ pub(super) struct Lights {
 const KEY_COLOR: Rgb = Rgb([2.35, 2.22, 2.02]);
 const FILL_COLOR: Rgb = Rgb([0.36, 0.42, 0.52]);
 const RIM_COLOR: Rgb = Rgb([0.75, 0.82, 0.95]);
-const SKY_COLOR: Rgb = Rgb([0.62, 0.66, 0.74]);
-const GROUND_COLOR: Rgb = Rgb([0.36, 0.31, 0.29]);
+const SKY_COLOR: Rgb = Rgb([0.54, 0.57, 0.64]);
+const GROUND_COLOR: Rgb = Rgb([0.27, 0.22, 0.20]);
 
 /// What reaches a vertex, each in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,10 +134,11 @@ impl Lights {
         let ambient = GROUND_COLOR.mix(SKY_COLOR, sky) * exposure.ambient;
         let mut diffuse = ambient;
         let mut gloss = Rgb::BLACK;
-        for (direction, light, reach) in [
-            (&self.key, KEY_COLOR, exposure.key),
-            (&self.fill, FILL_COLOR, exposure.ambient),
-            (&self.rim, RIM_COLOR, exposure.ambient),
+        // The rim light is wide and soft: it outlines the shape and leaves hardly a highlight.
+        for (direction, light, reach, sharpness) in [
+            (&self.key, KEY_COLOR, exposure.key, 1.0),
+            (&self.fill, FILL_COLOR, exposure.ambient, 0.6),
+            (&self.rim, RIM_COLOR, exposure.ambient, 0.12),
         ] {
             let cos = normal.dot(direction) as f32;
             let wrapped = Rgb(material.wrap.map(|w| {
@@ -146,8 +147,8 @@ impl Lights {
                 x * x.min(1.0).powf(w) / (1.0 + 0.5 * w)
             }));
             diffuse += light.filter(wrapped) * (reach * std::f32::consts::FRAC_1_PI * 1.15);
-            gloss +=
-                light * (highlight(material, normal, to_eye, direction) * cos.max(0.0) * reach);
+            let shine = highlight(material, normal, to_eye, direction);
+            gloss += light * (shine * cos.max(0.0) * reach * sharpness);
         }
         // Faint sky reflection towards grazing angles.
         let grazing = (1.0 - view_cos).powi(5) * (1.0 - material.roughness) * 0.25;

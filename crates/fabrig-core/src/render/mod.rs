@@ -26,6 +26,7 @@ mod layer;
 mod light;
 mod picture;
 mod sheet;
+mod subjects;
 mod tracer;
 
 pub use animation::write_gif;
@@ -38,3 +39,6 @@ pub use image_buffer::Image;
 pub use layer::{Edges, Layer, Material, Paint, Points};
 pub use picture::{Background, Picture, Shot};
 pub use sheet::Sheet;
+pub use subjects::{
+    RecordingContent, patch_layer, patch_layers, recording_layers, template_layers,
+};
