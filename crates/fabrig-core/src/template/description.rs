@@ -9,72 +9,95 @@ use super::TemplateError;
 /// The text of `template.toml`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Description {
+pub(super) struct Description {
     /// Name of the pack.
-    pub name: String,
+    pub(super) name: String,
     /// Version of the pack's contents.
-    pub version: u32,
+    pub(super) version: u32,
     /// Whose work it stands on.
-    pub credit: String,
+    pub(super) credit: String,
     /// How it is made from source data; absent in a pack that is not built here.
-    pub build: Option<BuildRecipe>,
+    pub(super) build: Option<BuildRecipe>,
     /// Named points, by name; those that end in `_l` are mirrored to `_r`.
-    pub landmarks: BTreeMap<String, LandmarkEntry>,
+    pub(super) landmarks: BTreeMap<String, LandmarkEntry>,
     /// Labelled parts, painted in this order, later over earlier.
-    pub regions: Vec<RegionEntry>,
+    pub(super) regions: Vec<RegionEntry>,
 }
 
 /// A named point of the skin.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LandmarkEntry {
+pub(super) struct LandmarkEntry {
     /// Vertex of the skin.
-    pub vertex: u32,
+    pub(super) vertex: u32,
     /// Where it is, in words.
-    pub meaning: String,
+    pub(super) meaning: String,
 }
 
 /// A labelled part of the skin and the rule that says where it is.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RegionEntry {
+pub(super) struct RegionEntry {
     /// Name; one that ends in `_l` is mirrored to `_r`.
-    pub name: String,
+    pub(super) name: String,
     /// Regions that it must never be matched or bridged to.
     #[serde(default)]
-    pub apart_from: Vec<String>,
+    pub(super) apart_from: Vec<String>,
     /// Landmarks of a closed outline, joined by the shortest ways along edges. Empty: the
     /// whole skin.
     #[serde(default)]
-    pub outline: Vec<String>,
+    pub(super) outline: Vec<String>,
     /// A landmark inside the outline: the region spreads from it along edges up to the outline.
-    pub inside: Option<String>,
+    pub(super) inside: Option<String>,
     /// Whether the outline's own vertices belong to the region.
     #[serde(default)]
-    pub with_outline: bool,
+    pub(super) with_outline: bool,
 }
 
 /// How a pack is made from the MakeHuman base mesh and its targets.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BuildRecipe {
+pub(super) struct BuildRecipe {
     /// Source vertex on the mid plane at the front of the neck where the head is cut off; the
     /// cut follows the edge loop through it.
-    pub neck_vertex: u32,
+    pub(super) neck_vertex: u32,
     /// Length of one source unit. [mm]
-    pub millimetres_per_unit: f64,
+    pub(super) millimetres_per_unit: f64,
     /// Landmark pair whose midpoint is the origin of the head frame.
-    pub origin: String,
+    pub(super) origin: String,
     /// Angles of eyeLookUp, eyeLookDown, eyeLookIn and eyeLookOut at weight 1. [degrees]
-    pub look_degrees: [f64; 4],
+    pub(super) look_degrees: [f64; 4],
     /// Names of the whole-face shapes in the pack's order.
-    pub shapes: Vec<String>,
+    pub(super) shapes: Vec<String>,
     /// Shapes that open the jaw, push it forward and to the left.
-    pub jaw_shapes: [String; 3],
+    pub(super) jaw_shapes: [String; 3],
     /// Shape that puts the tongue out.
-    pub tongue_shape: String,
+    pub(super) tongue_shape: String,
+    /// Shapes that are made stronger or weaker than in the source, and by how much.
+    #[serde(default)]
+    pub(super) gain: BTreeMap<String, f64>,
+    /// How the lids are put right.
+    pub(super) lids: LidRecipe,
     /// Targets and how much of each makes the identity.
-    pub identity: BTreeMap<String, f64>,
+    pub(super) identity: BTreeMap<String, f64>,
+}
+
+/// How shapes are corrected at the lids.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LidRecipe {
+    /// Shapes under which the lids meet.
+    pub(super) closing: Vec<String>,
+    /// What stays open between closed lids. [mm]
+    pub(super) gap: f64,
+    /// Lids keep the distance from the eyeball that they have at rest, up to this. [mm]
+    pub(super) clearance: f64,
+    /// How far from the margin corrections reach. [mm]
+    pub(super) reach: f64,
+    /// How far corrections of neighbouring margin vertices mix. [mm]
+    pub(super) blur: f64,
+    /// How much nearer to the eyeball's centre the next ring of the margin must be. [mm]
+    pub(super) ring_step: f64,
 }
 
 impl Description {
@@ -83,7 +106,7 @@ impl Description {
     /// # Errors
     ///
     /// [`TemplateError::Text`] with line and column.
-    pub fn parse(text: &str) -> Result<Self, TemplateError> {
+    pub(super) fn parse(text: &str) -> Result<Self, TemplateError> {
         toml::from_str(text).map_err(|source| TemplateError::Text {
             file: "template.toml",
             source: Box::new(source),
@@ -93,7 +116,7 @@ impl Description {
 
 /// The name on the other side: `_l` for `_r` and back, `Left` for `Right` and back; `None` for
 /// a name that has no side.
-pub fn mirrored_name(name: &str) -> Option<String> {
+pub(super) fn mirrored_name(name: &str) -> Option<String> {
     for (a, b) in [
         ("_l", "_r"),
         ("_r", "_l"),

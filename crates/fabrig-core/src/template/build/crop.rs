@@ -10,8 +10,6 @@ use crate::template::TemplateError;
 pub(super) struct Head {
     /// Source vertex of each skin vertex, rising.
     pub(super) source: Vec<u32>,
-    /// Skin vertex of each source vertex that is in the head.
-    pub(super) skin_of: BTreeMap<u32, u32>,
     /// Quads in skin vertices; mirrored quads start at mirrored corners.
     pub(super) faces: Vec<Vec<u32>>,
     /// Mirror image of each skin vertex.
@@ -63,7 +61,6 @@ pub(super) fn crop_head(base: &BaseMesh, neck_vertex: u32) -> Result<Head, Templ
     Ok(Head {
         faces: mirrored_fans(faces, &mirror)?,
         source,
-        skin_of,
         mirror,
     })
 }

@@ -7,6 +7,7 @@
 
 mod crop;
 mod identity;
+mod lids;
 mod pack;
 mod regions;
 mod rigid;

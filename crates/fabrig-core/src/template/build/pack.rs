@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::crop::{Head, crop_head};
 use super::identity::{dense, identity, symmetric_left, symmetrize};
-use super::regions::paint_regions;
+use super::lids::Lids;
+use super::regions::{EdgeGraph, paint_regions};
 use super::rigid::{PARTS, Part, fit_hinge, fit_sphere, mean, part};
 use super::source::{BaseMesh, read_face_target};
 use crate::template::description::{BuildRecipe, Description, mirrored_name};
@@ -100,8 +101,17 @@ pub fn build_geometry(
     };
     let eyes = eyes(&take(&parts[0].source), recipe)?;
     let jaw = jaw(&shapes, &parts[3], &frame)?;
-    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head)?;
     let positions: Vec<Point> = skin.positions.iter().map(to_point).collect();
+    let graph = EdgeGraph::new(&head.faces, positions.len());
+    let lids = Lids::new(
+        &recipe.lids,
+        &positions,
+        &head.mirror,
+        &graph,
+        &landmarks,
+        (eyes[0].center, eyes[0].radius),
+    )?;
+    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids)?;
     let geometry = StoredGeometry {
         vertex_regions: paint_regions(
             &description,
@@ -179,8 +189,9 @@ impl Shapes<'_> {
             None => own.clone(),
         };
         let mut deltas = symmetric_left(&own, &other, &self.base.mirror);
+        let gain = self.recipe.gain.get(name).copied().unwrap_or(1.0);
         for delta in &mut deltas {
-            *delta *= self.recipe.millimetres_per_unit;
+            *delta *= gain * self.recipe.millimetres_per_unit;
         }
         Ok(deltas)
     }
@@ -192,7 +203,11 @@ fn take(deltas: &[Vector], source: &[u32]) -> Vec<Vector> {
 
 type NamedShapes = (Vec<(String, StoredShape)>, Vec<(String, f64)>);
 
-fn stored_shapes(shapes: &Shapes<'_>, head: &Head) -> Result<NamedShapes, TemplateError> {
+fn stored_shapes(
+    shapes: &Shapes<'_>,
+    head: &Head,
+    lids: &Lids<'_>,
+) -> Result<NamedShapes, TemplateError> {
     let mut stored: Vec<(String, StoredShape)> = Vec::new();
     let mut amplitudes: Vec<(String, f64)> = Vec::new();
     for name in &shapes.recipe.shapes {
@@ -201,7 +216,8 @@ fn stored_shapes(shapes: &Shapes<'_>, head: &Head) -> Result<NamedShapes, Templa
         let (shape, amplitude) = match partner {
             Some(other) => (StoredShape::MirrorOf(other as u32), amplitudes[other].1),
             None => {
-                let deltas = take(&shapes.symmetric(name)?, &head.source);
+                let mut deltas = take(&shapes.symmetric(name)?, &head.source);
+                lids.correct(name, &mut deltas);
                 let amplitude = deltas.iter().map(|d| d.norm()).fold(0.0, f64::max);
                 (StoredShape::Deltas(sparse(&deltas)), amplitude)
             }

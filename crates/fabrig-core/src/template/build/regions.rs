@@ -34,8 +34,8 @@ impl EdgeGraph {
         &self.neighbours[vertex as usize]
     }
 
-    /// The shortest way along edges, both ends included; equal lengths go to the lower vertex.
-    fn shortest_path(&self, positions: &[Point], from: u32, to: u32) -> Vec<u32> {
+    /// The shortest way along edges from `to` back to `from`, both included; equal lengths go to the lower vertex.
+    pub(super) fn shortest_path(&self, positions: &[Point], from: u32, to: u32) -> Vec<u32> {
         // Lengths in picometres, so that they have a total order.
         let length = |a: u32, b: u32| {
             ((positions[a as usize] - positions[b as usize]).norm() * 1e9).round() as u64
