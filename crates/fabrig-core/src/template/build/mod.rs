@@ -6,11 +6,15 @@
 //! parts, jaw and eye fits, shapes, regions.
 
 mod crop;
+mod decimate;
+mod face;
 mod identity;
 mod lids;
 mod pack;
 mod regions;
 mod rigid;
 mod source;
+mod subdivide;
 
+pub use face::FaceList;
 pub use pack::{BuildReport, build_geometry, build_template};
