@@ -78,6 +78,8 @@ pub(super) struct BuildRecipe {
     pub(super) gain: BTreeMap<String, f64>,
     /// How the lids are put right.
     pub(super) lids: LidRecipe,
+    /// How the lips are put right.
+    pub(super) lips: LipRecipe,
     /// Targets and how much of each makes the identity.
     pub(super) identity: BTreeMap<String, f64>,
 }
@@ -98,6 +100,26 @@ pub(super) struct LidRecipe {
     pub(super) blur: f64,
     /// How much nearer to the eyeball's centre the next ring of the margin must be. [mm]
     pub(super) ring_step: f64,
+}
+
+/// How shapes are corrected at the lips.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LipRecipe {
+    /// Shapes that only make sense on top of another: name -> the other. Both have no side.
+    pub(super) over: BTreeMap<String, String>,
+    /// How far the surroundings follow. [mm]
+    pub(super) blur: f64,
+    /// How deep the lining counts, behind the corner of the mouth. [mm]
+    pub(super) lining: f64,
+    /// Half the width of the blend from side to side. [mm]
+    pub(super) side_blend: f64,
+    /// Crossings that may stay. [mm]
+    pub(super) tolerance: f64,
+    /// Deeper overlaps are another part of the mouth, not a crossing. [mm]
+    pub(super) deepest: f64,
+    /// Rounds at most.
+    pub(super) rounds: u32,
 }
 
 impl Description {

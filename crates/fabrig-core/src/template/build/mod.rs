@@ -10,6 +10,7 @@ mod decimate;
 mod face;
 mod identity;
 mod lids;
+mod lips;
 mod pack;
 mod regions;
 mod rigid;

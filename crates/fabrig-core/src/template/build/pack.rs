@@ -6,14 +6,16 @@ use std::path::Path;
 use super::crop::{Head, crop_head};
 use super::identity::{dense, identity, symmetric_left, symmetrize};
 use super::lids::Lids;
+use super::lips::{LipVertices, Lips};
 use super::regions::{EdgeGraph, paint_regions};
 use super::rigid::{PARTS, Part, fit_hinge, fit_sphere, mean, part};
 use super::source::{BaseMesh, read_face_target};
+use crate::mesh::Polygons;
 use crate::template::description::{BuildRecipe, Description, mirrored_name};
 use crate::template::geometry::{
     StoredGeometry, StoredMesh, StoredPart, StoredShape, encode, to_point, to_steps,
 };
-use crate::template::load::landmarks;
+use crate::template::load::{landmarks, region_list};
 use crate::template::{EyeSocket, JawHinge, TemplateError};
 use crate::{Point, Vector};
 
@@ -111,15 +113,33 @@ pub fn build_geometry(
         &landmarks,
         (eyes[0].center, eyes[0].radius),
     )?;
-    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids)?;
+    let labels = paint_regions(
+        &description,
+        &landmarks,
+        &positions,
+        &head.faces,
+        &head.mirror,
+    )?;
+    let region_names = region_list(&description)?;
+    let corner = *landmarks
+        .get("lip_corner_l")
+        .ok_or_else(|| TemplateError::Missing {
+            what: "the lips".to_owned(),
+            name: "lip_corner_l".to_owned(),
+        })?;
+    let lips = Lips::new(
+        &recipe.lips,
+        &positions,
+        &head.mirror,
+        &Polygons::from_faces(&head.faces).triangles(),
+        &LipVertices {
+            region_of: &|v| &region_names[labels[v as usize] as usize].name,
+            back: positions[corner as usize].z - recipe.lips.lining,
+        },
+    );
+    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids, &lips)?;
     let geometry = StoredGeometry {
-        vertex_regions: paint_regions(
-            &description,
-            &landmarks,
-            &positions,
-            &head.faces,
-            &head.mirror,
-        )?,
+        vertex_regions: labels,
         skin,
         mirror: head.mirror.clone(),
         parts: PARTS
@@ -207,6 +227,7 @@ fn stored_shapes(
     shapes: &Shapes<'_>,
     head: &Head,
     lids: &Lids<'_>,
+    lips: &Lips<'_>,
 ) -> Result<NamedShapes, TemplateError> {
     let mut stored: Vec<(String, StoredShape)> = Vec::new();
     let mut amplitudes: Vec<(String, f64)> = Vec::new();
@@ -218,6 +239,11 @@ fn stored_shapes(
             None => {
                 let mut deltas = take(&shapes.symmetric(name)?, &head.source);
                 lids.correct(name, &mut deltas);
+                let over = match shapes.recipe.lips.over.get(name) {
+                    Some(other) => Some(take(&shapes.symmetric(other)?, &head.source)),
+                    None => None,
+                };
+                lips.correct(&mut deltas, over.as_deref());
                 let amplitude = deltas.iter().map(|d| d.norm()).fold(0.0, f64::max);
                 (StoredShape::Deltas(sparse(&deltas)), amplitude)
             }
