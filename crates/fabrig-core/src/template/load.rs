@@ -104,6 +104,13 @@ fn assemble(
     let shapes = shapes(stored)?;
     Ok(Template {
         name: description.name.clone(),
+        version: description.version,
+        credit: description.credit.trim().to_owned(),
+        landmark_meanings: description
+            .landmarks
+            .iter()
+            .map(|(name, entry)| (name.clone(), entry.meaning.clone()))
+            .collect(),
         landmarks: landmarks(description, &stored.mirror)?,
         regions: regions(description, &stored.vertex_regions, skin.vertex_count())?,
         part_deltas: part_deltas(stored, &rigid_parts)?,

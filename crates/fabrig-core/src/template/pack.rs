@@ -121,6 +121,10 @@ pub struct WholeFaceShape {
 pub struct Template {
     /// Name of the pack.
     pub name: String,
+    /// Version of the pack's contents.
+    pub version: u32,
+    /// Whose work the pack stands on, and under which licence.
+    pub credit: String,
     /// Neutral skin; its polygon fans are exact mirrors of each other. [mm]
     pub skin: Mesh,
     /// For each skin vertex its mirror image at (-x, y, z); itself on the mid plane (x = 0).
@@ -129,6 +133,8 @@ pub struct Template {
     pub regions: Regions,
     /// Named points of the skin.
     pub landmarks: Landmarks,
+    /// Where each landmark is, in words, by name; left ones speak for their mirror images.
+    pub landmark_meanings: BTreeMap<String, String>,
     /// Eyeballs, teeth, tongue.
     pub rigid_parts: Vec<RigidPart>,
     /// Whole-face shapes in the pack's order (ARKit's 52 first).

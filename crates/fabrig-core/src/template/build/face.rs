@@ -5,7 +5,6 @@
 //! eyeballs and teeth as loose parts, in another unit, place and orientation.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 
 use nalgebra::Rotation3;
@@ -17,6 +16,7 @@ use super::identity::identity;
 use super::rigid::{PARTS, fit_sphere, part};
 use super::source::BaseMesh;
 use super::subdivide::catmull_clark;
+use crate::atomic_file::write_atomically;
 use crate::mesh::{Mesh, Polygons};
 use crate::template::demo::{StoredFace, assemble};
 use crate::template::geometry::{pack, to_steps};
@@ -98,16 +98,11 @@ impl FaceList {
         path: &Path,
     ) -> Result<(), TemplateError> {
         let bytes = pack(&self.stored(data, template, name)?)?;
-        let folder = path.parent().unwrap_or_else(|| Path::new("."));
-        let write = || -> std::io::Result<()> {
-            let mut file = tempfile::NamedTempFile::new_in(folder)?;
-            file.write_all(&bytes)?;
-            file.persist(path)?;
-            Ok(())
-        };
-        write().map_err(|source| TemplateError::Write {
-            path: path.to_owned(),
-            source,
+        write_atomically(path, |file| file.write_all(&bytes)).map_err(|source| {
+            TemplateError::Write {
+                path: path.to_owned(),
+                source,
+            }
         })
     }
 

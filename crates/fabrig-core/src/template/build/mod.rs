@@ -2,8 +2,18 @@
 //! units drawn for it.
 //!
 //! The recipe is `template.toml` in the pack's own folder; the outcome is `geometry.bin` beside
-//! it. The same source and recipe give the same bytes. Steps: identity, crop, symmetry, rigid
-//! parts, jaw and eye fits, shapes, regions.
+//! it. The same source and recipe give the same bytes. Steps:
+//!
+//! 1. identity: base mesh + weighted targets, made exactly symmetric, scaled to millimetres;
+//! 2. crop at the edge loop around the neck; mirrored quads get mirrored corner orders;
+//! 3. eyeballs, teeth, tongue; a sphere fitted to each eyeball, a hinge to the lower teeth;
+//! 4. landmarks from the recipe, regions by outline and flood fill;
+//! 5. shapes: left and right averaged into exact mirrors, then corrected at the lids (they keep
+//!    their distance from the eyeball, blinks close) and at the lips (they do not pass through
+//!    each other).
+//!
+//! [`FaceList`] makes faces of other people from the same source, remeshed, for tests and for
+//! the demo.
 
 mod crop;
 mod decimate;

@@ -1,6 +1,5 @@
 //! The build itself, step after step.
 
-use std::io::Write;
 use std::path::Path;
 
 use super::crop::{Head, crop_head};
@@ -10,6 +9,7 @@ use super::lips::{LipVertices, Lips};
 use super::regions::{EdgeGraph, paint_regions};
 use super::rigid::{PARTS, Part, fit_hinge, fit_sphere, mean, part};
 use super::source::{BaseMesh, read_face_target};
+use crate::atomic_file::write_atomically;
 use crate::mesh::Polygons;
 use crate::template::description::{BuildRecipe, Description, mirrored_name};
 use crate::template::geometry::{
@@ -48,16 +48,8 @@ pub fn build_template(data: &Path, folder: &Path) -> Result<BuildReport, Templat
         std::fs::read_to_string(&path).map_err(|source| TemplateError::Read { path, source })?;
     let (bytes, report) = build_geometry(data, &text)?;
     let path = folder.join("geometry.bin");
-    let write = || -> std::io::Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        file.write_all(&bytes)?;
-        file.persist(&path)?;
-        Ok(())
-    };
-    write().map_err(|source| TemplateError::Write {
-        path: path.clone(),
-        source,
-    })?;
+    write_atomically(&path, |file| file.write_all(&bytes))
+        .map_err(|source| TemplateError::Write { path, source })?;
     Ok(report)
 }
 
