@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Point;
 use crate::template::RigidBody;
+use crate::{Point, Vector};
 
 /// What a patch models; materials and constraints differ by kind (paper, Table 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -88,6 +88,73 @@ pub struct SurfaceNode {
     pub depth: f64,
 }
 
+impl SurfaceNode {
+    /// Values at the skin's vertices blended at this node.
+    ///
+    /// Terms are added by falling weight, so that a node and its mirror image round alike.
+    pub fn blend(&self, triangles: &[[u32; 3]], values: &[Vector]) -> Vector {
+        let corners = triangles[self.triangle as usize];
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a: &usize, &b| self.barycentric[b].total_cmp(&self.barycentric[a]));
+        order
+            .iter()
+            .map(|&k| values[corners[k] as usize] * self.barycentric[k])
+            .sum()
+    }
+}
+
+/// How many nodes the grids have.
+///
+/// Counts across are even and counts around an opening multiples of four, so that no node
+/// lies on the mid plane and every node has a mirror image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Resolution {
+    /// Nodes along and across the fibres of linear muscles and fat pads.
+    pub sheet: [u32; 2],
+    /// Nodes around and outwards of sphincters.
+    pub ring: [u32; 2],
+}
+
+impl Resolution {
+    /// 2,010 nodes with the default layout.
+    pub const COARSE: Self = Self {
+        sheet: [7, 6],
+        ring: [16, 6],
+    };
+    /// 19,380 nodes with the default layout, as the paper has.
+    pub const STANDARD: Self = Self {
+        sheet: [21, 20],
+        ring: [48, 15],
+    };
+    /// 50,080 nodes with the default layout.
+    pub const FINE: Self = Self {
+        sheet: [34, 32],
+        ring: [76, 24],
+    };
+    /// 200,320 nodes with the default layout.
+    pub const FINEST: Self = Self {
+        sheet: [68, 64],
+        ring: [152, 48],
+    };
+
+    /// The grid of a patch of this kind.
+    pub fn grid(self, kind: PatchKind) -> GridShape {
+        let is_periodic = kind == PatchKind::Sphincter;
+        let [u_count, v_count] = if is_periodic { self.ring } else { self.sheet };
+        GridShape {
+            u_count,
+            v_count,
+            is_periodic,
+        }
+    }
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self::STANDARD
+    }
+}
+
 /// Nodes of a patch that are held to something else (Eq. 5).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Attachment {
@@ -112,6 +179,9 @@ pub enum Attachment {
 }
 
 /// A patch on the template: what every face shares.
+///
+/// The right patch of a pair has the same (u, v) as the left, mirrored: its quads, as
+/// [`GridShape::quads`] lists them, wind clockwise seen from outside; see [`Self::quads`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PatchChart {
     /// `zygomaticus_major_l`, `orbicularis_oris`, `malar_fat_r`, ...
@@ -132,6 +202,33 @@ pub struct PatchChart {
     pub color: [u8; 3],
     /// Index of its mirror image; itself for a midline patch.
     pub mirror: u32,
+}
+
+impl PatchChart {
+    /// The node of the mirror image (of patch [`Self::mirror`]) that is this node's image.
+    pub fn mirror_node(&self, node: usize) -> usize {
+        if self.side != Side::Mid {
+            return node;
+        }
+        let (u_count, v_count) = (self.grid.u_count as usize, self.grid.v_count as usize);
+        let (u, v) = (node % u_count, node / u_count);
+        if self.grid.is_periodic {
+            v * u_count + (u_count + u_count / 2 - 1 - u) % u_count
+        } else {
+            (v_count - 1 - v) * u_count + u
+        }
+    }
+
+    /// Quads of the grid, counter-clockwise seen from outside on either side.
+    pub fn quads(&self) -> Vec<[u32; 4]> {
+        let mut quads = self.grid.quads();
+        if self.side == Side::Right {
+            for quad in &mut quads {
+                quad.reverse();
+            }
+        }
+        quads
+    }
 }
 
 /// A patch laid under one face.

@@ -1,0 +1,110 @@
+//! Checks of a laid grid: no fold, no nodes on top of each other.
+
+use super::error::AnatomyError;
+use super::patch::{Patch, Side};
+use super::skin_frame::SkinFrame;
+use crate::Vector;
+
+/// Least distance between neighbours, relative to the mean distance in the grid.
+const LEAST_SPACING: f64 = 0.02;
+
+/// Cosine between a quad's normal and the skin's below which the quad counts as folded. At
+/// the margins of lips and lids the skin turns inwards within a row, so that a sound quad may
+/// stand at a right angle to it; a fold turns all the way.
+const FOLDED: f64 = -0.5;
+
+/// Checks a grid laid on the template.
+///
+/// # Errors
+///
+/// [`AnatomyError::Folded`] where a quad faces inwards, [`AnatomyError::TooClose`] where
+/// neighbouring nodes all but coincide.
+pub(super) fn check_grid(skin: &SkinFrame, patch: &Patch) -> Result<(), AnatomyError> {
+    let grid = patch.chart.grid;
+    let spacing = Spacing::of(patch);
+    let limit = spacing.mean * LEAST_SPACING;
+    if spacing.least < limit {
+        let node = spacing.least_at;
+        return Err(AnatomyError::TooClose {
+            patch: patch.chart.name.clone(),
+            u: node % grid.u_count,
+            v: node / grid.u_count,
+            distance: spacing.least,
+            limit,
+        });
+    }
+    let sign = if patch.chart.side == Side::Right {
+        -1.0
+    } else {
+        1.0
+    };
+    for quad in grid.quads() {
+        let [a, b, c, d] = quad.map(|k| patch.neutral[k as usize]);
+        let area = (c - a).cross(&(d - b)) * sign;
+        // The two nodes further from the margin: on a margin the skin's normal tells little.
+        let outwards: Vector = quad[2..]
+            .iter()
+            .map(|&k| {
+                let node = &patch.chart.nodes[k as usize];
+                skin.normal(node.triangle, node.barycentric)
+            })
+            .sum();
+        if area.dot(&outwards) < FOLDED * area.norm() * outwards.norm() {
+            return Err(AnatomyError::Folded {
+                patch: patch.chart.name.clone(),
+                u: quad[0] % grid.u_count,
+                v: quad[0] / grid.u_count,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Distances between neighbouring nodes of a grid. [mm]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spacing {
+    /// Least distance.
+    pub least: f64,
+    /// First node of the pair with the least distance.
+    pub least_at: u32,
+    /// Mean distance.
+    pub mean: f64,
+    /// Greatest distance.
+    pub greatest: f64,
+}
+
+impl Spacing {
+    /// Measures a laid patch.
+    pub fn of(patch: &Patch) -> Self {
+        let grid = patch.chart.grid;
+        let mut spacing = Self {
+            least: f64::INFINITY,
+            least_at: 0,
+            mean: 0.0,
+            greatest: 0.0,
+        };
+        let mut count = 0u32;
+        let mut add = |a: usize, b: usize| {
+            let distance = (patch.neutral[a] - patch.neutral[b]).norm();
+            if distance < spacing.least {
+                spacing.least = distance;
+                spacing.least_at = a as u32;
+            }
+            spacing.greatest = spacing.greatest.max(distance);
+            spacing.mean += distance;
+            count += 1;
+        };
+        for v in 0..grid.v_count {
+            for u in 0..grid.u_count {
+                if u + 1 < grid.u_count || grid.is_periodic {
+                    add(grid.index(u, v), grid.index((u + 1) % grid.u_count, v));
+                }
+                if v + 1 < grid.v_count {
+                    add(grid.index(u, v), grid.index(u, v + 1));
+                }
+            }
+        }
+        spacing.mean /= f64::from(count.max(1));
+        spacing
+    }
+}
