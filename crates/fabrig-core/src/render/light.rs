@@ -91,7 +91,8 @@ impl Lights {
                     let hit = tracer.cast(&origin, &direction, 0.0, reach, |i, _| occludes(i));
                     open += hit.map_or(1.0, |h| (h.distance / reach).sqrt());
                 }
-                // A face turned away is dark by its angle already.
+                // A face turned away is dark by its angle already; rays that leave it through its own
+                // surface meet backs, which must not cut off the light that wraps around.
                 let facing = n.dot(&self.key);
                 let mut lit = KEY_RAYS;
                 if facing > -0.5 {
@@ -103,7 +104,7 @@ impl Lights {
                             let far = 4.0 * tracer.radius;
                             tracer
                                 .cast(&origin, &direction, 0.0, far, |i, front| {
-                                    front && occludes(i)
+                                    (front || facing > 0.15) && occludes(i)
                                 })
                                 .is_none()
                         })
