@@ -5,8 +5,9 @@
 //!    the smoothed normal there (tilted a few ways), with every roll and a range of sizes.
 //!    Each guess is judged by how closely a sparse set of template points, with normals, meets
 //!    the mesh (voxel grid, template millimetres, so that size plays no part).
-//! 2. Refine the best guesses by trimmed point-to-plane ICP with scale, both ways.
-//! 3. Confidence: the margin of the best over the best that differs from it.
+//! 2. Settle the better guesses by a few steps of ICP on the same grid.
+//! 3. Refine the best of those by trimmed point-to-plane ICP with scale, both ways.
+//! 4. Confidence: the margin of the best over the best that differs from it.
 
 use nalgebra::{SMatrix, SVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
@@ -25,7 +26,8 @@ const DIAGONALS_MM: [f64; 11] = [
     210.0, 250.0, 300.0, 360.0, 430.0, 520.0, 620.0, 740.0, 900.0, 1150.0, 1500.0,
 ];
 const ANCHOR_COUNT: usize = 700;
-const REFINED_COUNT: usize = 32;
+const SETTLED_COUNT: usize = 2400;
+const REFINED_COUNT: usize = 20;
 
 /// A similarity that takes the mesh to the head frame, and how much it can be trusted.
 #[derive(Debug, Clone, Copy)]
@@ -79,17 +81,24 @@ pub(super) fn align(
                         * UnitQuaternion::from_axis_angle(&Vector::x_axis(), tilt.to_radians());
                     for size in DIAGONALS_MM {
                         let from_head = place(anchor.point, nose, turn, diagonal / size);
-                        let score = judge(&grid, &coarse, &from_head, f64::INFINITY);
+                        let score = judge(&grid, &coarse, &from_head);
                         keep(&mut best, Guess { score, from_head }, 6);
                     }
                 }
             }
             for guess in &mut best {
-                guess.score = judge(&grid, &fine, &guess.from_head, f64::INFINITY);
+                guess.score = judge(&grid, &fine, &guess.from_head);
             }
             best
         })
         .flatten_iter()
+        .collect();
+    guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
+    guesses.truncate(SETTLED_COUNT);
+    let sparse = model.spread_samples(70);
+    guesses = guesses
+        .par_iter()
+        .map(|g| settle(&grid, &sparse, &fine, &g.from_head))
         .collect();
     guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
     let chosen = distinct(&guesses, REFINED_COUNT, 12.0, 15.0, 1.12);
@@ -100,11 +109,13 @@ pub(super) fn align(
         .map(|g| refine(model, surface, grid.samples(), &points, &g.from_head, 14))
         .collect();
     refined.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let finalists: Vec<Guess> = distinct(&refined, 6, 10.0, 12.0, 1.1)
+    let mut finalists: Vec<Guess> = distinct(&refined, 6, 10.0, 12.0, 1.1)
         .par_iter()
-        .map(|g| refine(model, surface, grid.samples(), &points, &g.from_head, 25))
+        .map(|g| {
+            let further = refine(model, surface, grid.samples(), &points, &g.from_head, 25);
+            if further.score < g.score { further } else { *g }
+        })
         .collect();
-    let mut finalists = finalists;
     finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
     let best = *finalists.first()?;
     let rival = refined
@@ -119,6 +130,9 @@ pub(super) fn align(
         confidence: (1.0 - best.score / rival).clamp(0.0, 1.0),
     })
 }
+
+/// A place on the template, where it should go, the normal there, and trust; head frame.
+type Pair = (Point, Point, Vector, f64);
 
 #[derive(Debug, Clone, Copy)]
 struct Guess {
@@ -144,7 +158,7 @@ fn place(anchor: Point, nose: Point, turn: UnitQuaternion<f64>, scale: f64) -> S
 
 /// Mean capped distance of template samples from the mesh, plus a penalty for normals that
 /// disagree. [mm]
-fn judge(grid: &ClosestGrid, samples: &[Sample], from_head: &Similarity3<f64>, limit: f64) -> f64 {
+fn judge(grid: &ClosestGrid, samples: &[Sample], from_head: &Similarity3<f64>) -> f64 {
     let scale = from_head.scaling();
     let mut sum = 0.0;
     for s in samples {
@@ -153,12 +167,46 @@ fn judge(grid: &ClosestGrid, samples: &[Sample], from_head: &Similarity3<f64>, l
         let near = grid.closest(&p);
         let distance = ((near.point - p).norm() / scale).min(CUTOFF_MM);
         let disagreement = (1.0 - n.dot(&near.normal)).min(1.0);
-        sum += (distance + 0.4 * CUTOFF_MM * disagreement).min(CUTOFF_MM);
-        if sum > limit {
-            break;
-        }
+        sum += s.weight * (distance + 0.4 * CUTOFF_MM * disagreement).min(CUTOFF_MM);
     }
-    sum / samples.len() as f64
+    sum / samples.iter().map(|s| s.weight).sum::<f64>()
+}
+
+/// A few steps of point-to-plane ICP against the grid: guesses are a voxel or two, some
+/// degrees and some percent off, which hides a right one among wrong ones.
+fn settle(
+    grid: &ClosestGrid,
+    samples: &[Sample],
+    judged: &[Sample],
+    start: &Similarity3<f64>,
+) -> Guess {
+    let mut from_head = *start;
+    for _ in 0..8 {
+        let to_head = from_head.inverse();
+        let pairs: Vec<Pair> = samples
+            .iter()
+            .filter_map(|s| {
+                let near = grid.closest(&from_head.transform_point(&s.point));
+                let normal = to_head.isometry.rotation * near.normal;
+                let q = to_head.transform_point(&near.point);
+                let is_mate = normal.dot(&s.normal) > 0.2
+                    && (q - s.point).norm_squared() < 2.5 * CUTOFF_MM * CUTOFF_MM;
+                is_mate.then_some((s.point, q, normal, s.weight))
+            })
+            .collect();
+        let Some(step) = similarity_step(&pairs) else {
+            break;
+        };
+        from_head *= step;
+    }
+    let ratio = from_head.scaling() / start.scaling();
+    if !(0.6..1.6).contains(&ratio) {
+        from_head = *start;
+    }
+    Guess {
+        score: judge(grid, judged, &from_head),
+        from_head,
+    }
 }
 
 /// Places that could be a nose tip: spread over the mesh, where it bulges outwards, with
@@ -188,6 +236,7 @@ fn anchors(grid: &ClosestGrid, diagonal: f64) -> Vec<Sample> {
                 Sample {
                     point: anchor.point,
                     normal,
+                    weight: 1.0,
                 },
             ))
         })
@@ -288,8 +337,7 @@ fn refine(
         let scale = from_head.scaling();
         let to_head = from_head.inverse();
         let reach = if round < rounds / 2 { 25.0 } else { 12.0 };
-        // (place on the template, where it should go, normal there), all in the head frame.
-        let mut pairs: Vec<(Point, Point, Vector)> = Vec::new();
+        let mut pairs: Vec<Pair> = Vec::new();
         for s in points {
             let p = from_head.transform_point(&s.point);
             let n = from_head.isometry.rotation * s.normal;
@@ -298,14 +346,19 @@ fn refine(
             });
             if let Some(at) = found {
                 let normal = to_head.isometry.rotation * unit_normal(surface, at.triangle);
-                pairs.push((s.point, to_head.transform_point(&at.point), normal));
+                pairs.push((
+                    s.point,
+                    to_head.transform_point(&at.point),
+                    normal,
+                    s.weight,
+                ));
             }
         }
         for s in mesh_samples.iter().step_by(stride) {
             let q = to_head.transform_point(&s.point);
             let n = to_head.isometry.rotation * s.normal;
             if let Some(p) = model.closest_on_face(&q, reach * 0.6, &n) {
-                pairs.push((p, q, n));
+                pairs.push((p, q, n, 0.4));
             }
         }
         let Some(step) = similarity_step(&pairs) else {
@@ -336,13 +389,13 @@ fn score(surface: &Surface, points: &[Sample], from_head: &Similarity3<f64>) -> 
             let p = from_head.transform_point(&s.point);
             let n = from_head.isometry.rotation * s.normal;
             let Some(at) = surface.closest_where(&p, CUTOFF_MM * scale, |_| true) else {
-                return CUTOFF_MM;
+                return s.weight * CUTOFF_MM;
             };
             let disagreement = (1.0 - facing(surface, at.triangle, &n)).min(1.0);
-            (at.distance / scale + 0.4 * CUTOFF_MM * disagreement).min(CUTOFF_MM)
+            s.weight * (at.distance / scale + 0.4 * CUTOFF_MM * disagreement).min(CUTOFF_MM)
         })
         .sum();
-    sum / points.len() as f64
+    sum / points.iter().map(|s| s.weight).sum::<f64>()
 }
 
 fn unit_normal(surface: &Surface, triangle: u32) -> Vector {
@@ -359,19 +412,19 @@ fn facing(surface: &Surface, triangle: u32, normal: &Vector) -> f64 {
 
 /// One Gauss-Newton step of point-to-plane distances (with a tenth of point-to-point, which
 /// keeps flat parts from sliding), robust by Geman-McClure weights at the median.
-fn similarity_step(pairs: &[(Point, Point, Vector)]) -> Option<Similarity3<f64>> {
+fn similarity_step(pairs: &[Pair]) -> Option<Similarity3<f64>> {
     if pairs.len() < 30 {
         return None;
     }
-    let mut distances: Vec<f64> = pairs.iter().map(|(p, q, _)| (q - p).norm()).collect();
+    let mut distances: Vec<f64> = pairs.iter().map(|(p, q, ..)| (q - p).norm()).collect();
     let middle = distances.len() / 2;
     let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
     let sigma_squared = (2.0 * *median).max(0.5).powi(2);
     let mut a = SMatrix::<f64, 7, 7>::zeros();
     let mut b = SVector::<f64, 7>::zeros();
-    for (p, q, n) in pairs {
+    for (p, q, n, trust) in pairs {
         let d = q - p;
-        let w = (sigma_squared / (sigma_squared + d.norm_squared())).powi(2);
+        let w = trust * (sigma_squared / (sigma_squared + d.norm_squared())).powi(2);
         // x -> x + t + omega x p + s p, rotation and scale per 100 mm to balance the system.
         let arm = p.coords / 100.0;
         let mut add = |direction: &Vector, weight: f64| {

@@ -12,6 +12,8 @@ use crate::{Point, Vector};
 pub(super) struct Sample {
     pub(super) point: Point,
     pub(super) normal: Vector,
+    /// How much it tells, relative to others.
+    pub(super) weight: f64,
 }
 
 /// Samples spread evenly over triangles: about one every `spacing`, at least one a triangle.
@@ -36,6 +38,7 @@ pub(super) fn sample_surface(
                 samples.push(Sample {
                     point: a + (b - a) * u + (c - a) * v,
                     normal,
+                    weight: 1.0,
                 });
             }
         }

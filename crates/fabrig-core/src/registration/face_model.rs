@@ -7,6 +7,11 @@ use crate::mesh::{Surface, Topology, triangle_normals, vertex_normals};
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
 
+/// What lies farther than this from the nose tip is no part of the front of a face. [mm]
+const FRONT_MM: f64 = 95.0;
+/// Detail is judged within this distance. [mm]
+const DETAIL_MM: f64 = 12.0;
+
 /// How a template vertex takes part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
@@ -137,7 +142,11 @@ impl<'a> FaceModel<'a> {
     /// the nose tip on: a prefix of a longer list is the shorter one.
     pub(super) fn spread_samples(&self, count: usize) -> Vec<Sample> {
         let candidates: Vec<usize> = (0..self.roles.len())
-            .filter(|&v| self.roles[v] == Role::Face && self.normals[v].z > -0.2)
+            .filter(|&v| {
+                self.roles[v] == Role::Face
+                    && self.normals[v].z > 0.1
+                    && (self.positions()[v] - self.nose_tip()).norm() < FRONT_MM
+            })
             .collect();
         let mut distance: Vec<f64> = candidates
             .iter()
@@ -154,12 +163,33 @@ impl<'a> FaceModel<'a> {
             chosen.push(Sample {
                 point,
                 normal: self.normals[candidates[k]],
+                weight: 0.25 + (self.detail(candidates[k]) / 0.08).min(1.0),
             });
             for (d, &v) in distance.iter_mut().zip(&candidates) {
                 *d = d.min((self.positions()[v] - point).norm_squared());
             }
         }
         chosen
+    }
+
+    /// How much normals vary around a vertex, 0 = flat: nose, lips and eyes tell more about
+    /// where a face is than cheeks do.
+    fn detail(&self, vertex: usize) -> f64 {
+        let (p, n) = (self.positions()[vertex], self.normals[vertex]);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (q, m) in self
+            .positions()
+            .iter()
+            .zip(&self.normals)
+            .zip(&self.roles)
+            .filter_map(|(place, role)| (*role == Role::Face).then_some(place))
+        {
+            if (q - p).norm_squared() < DETAIL_MM * DETAIL_MM {
+                sum += 1.0 - n.dot(m);
+                count += 1.0;
+            }
+        }
+        sum / f64::max(count, 1.0)
     }
 
     /// The closest place of the template's face to a point of the head frame within `reach`

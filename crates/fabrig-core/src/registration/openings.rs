@@ -1,20 +1,47 @@
-//! Mouth and eyes of the face: found, split into an upper and a lower line from corner to
-//! corner, and matched to the template's contact lines.
+//! Mouth and eyes of the face: where its lips and lids part, seen from the front.
+//!
+//! The face is probed by rays in columns from corner to corner of the opening, as the template
+//! deformed so far places it. In a column of depths the parting is a gap (open mouth, an eye),
+//! a step (the upper lip overhangs the lower one) or a valley (a crease of a closed surface).
+//! The path of most evidence across the columns is found by dynamic programming. This works
+//! alike for holes of the mesh, for mouths and sockets with an inside, and for fused scans.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 use super::face_model::{FaceModel, Opening, OpeningKind};
 use super::nonrigid_icp::Pin;
+use super::report::OpeningState;
 use super::target::Target;
+use crate::mesh::Topology;
 use crate::{Point, Vector};
 
-/// Upper and lower line of an opening of the face, from the right corner (-X) to the left one.
+/// Columns from corner to corner.
+const COLUMN_COUNT: usize = 41;
+/// Rays reach this far above and below the expected line, one every [`STEP_MM`]. [mm]
+const HALF_HEIGHT_MM: f64 = 9.0;
+const STEP_MM: f64 = 0.25;
+/// Rows of a column.
+const ROW_COUNT: usize = (2.0 * HALF_HEIGHT_MM / STEP_MM) as usize + 1;
+/// What lies this far behind the skin beside it is seen through a gap. [mm]
+const GAP_MM: f64 = 3.0;
+/// Neighbouring rays that differ by more see two surfaces. [mm]
+const JUMP_MM: f64 = 0.9;
+/// A valley is judged against the skin this many rows above and below.
+const VALLEY_ROWS: usize = 6;
+/// Evidence below this is noise. [mm]
+const MIN_EVIDENCE: f64 = 0.12;
+
+/// The parting of an opening of the face.
 #[derive(Debug, Clone)]
 pub(super) struct FaceOpening {
     pub(super) kind: OpeningKind,
-    pub(super) upper: Vec<Point>,
-    pub(super) lower: Vec<Point>,
+    pub(super) state: OpeningState,
+    /// Fraction from the right corner (-X) to the left one, upper place, lower place, trust.
+    pub(super) columns: Vec<(f64, Point, Point, f64)>,
 }
 
-/// Finds the openings that are holes of the mesh, given the template deformed so far.
+/// Finds the partings of all openings, given the template deformed so far.
 pub(super) fn find_openings(
     model: &FaceModel<'_>,
     target: &Target,
@@ -23,65 +50,229 @@ pub(super) fn find_openings(
     model
         .openings
         .iter()
-        .filter_map(|opening| find_opening(opening, target, vertices))
+        .filter_map(|opening| trace(opening, target, vertices))
         .collect()
 }
 
-fn find_opening(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceOpening> {
-    let ring: Vec<Point> = opening
-        .upper
-        .iter()
-        .chain(opening.lower.iter().rev())
-        .map(|&v| vertices[v as usize])
-        .collect();
-    let (center, length) = (middle(&ring), perimeter(&ring));
-    let chain = target
-        .boundary_loops
-        .iter()
-        .filter_map(|chain| {
-            let points: Vec<Point> = chain
-                .iter()
-                .map(|&v| target.positions[v as usize])
-                .collect();
-            let ratio = perimeter(&points) / length;
-            let apart = (middle(&points) - center).norm();
-            ((0.4..2.5).contains(&ratio) && apart < 0.35 * length).then_some((apart, points))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0))?
-        .1;
-    split(opening.kind, &chain)
+/// One column of rays: depth of each row along the view, from the lowest row up; `None` where
+/// nothing is met.
+struct Column {
+    fraction: f64,
+    hits: Vec<Option<(f64, Point)>>,
+    evidence: Vec<f64>,
+    is_gap: Vec<bool>,
 }
 
-/// Cuts a closed chain at its corners. A corner is where the chain reaches farthest to its
-/// side; of the two parts the one with the higher middle is the upper line.
-fn split(kind: OpeningKind, chain: &[Point]) -> Option<FaceOpening> {
-    let right = (0..chain.len()).min_by(|&a, &b| chain[a].x.total_cmp(&chain[b].x))?;
-    let left = (0..chain.len()).max_by(|&a, &b| chain[a].x.total_cmp(&chain[b].x))?;
-    let walk = |from: usize, to: usize| {
-        let mut points = vec![chain[from]];
-        let mut at = from;
-        while at != to {
-            at = (at + 1) % chain.len();
-            points.push(chain[at]);
-        }
-        points
-    };
-    let one = walk(right, left);
-    let mut other = walk(left, right);
-    other.reverse();
-    if one.len() < 3 || other.len() < 3 {
+fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceOpening> {
+    let line =
+        |side: &[u32]| -> Vec<Point> { side.iter().map(|&v| vertices[v as usize]).collect() };
+    let (upper, lower) = (line(&opening.upper), line(&opening.lower));
+    let (right, left) = (
+        nalgebra::center(&upper[0], &lower[0]),
+        nalgebra::center(&upper[upper.len() - 1], &lower[lower.len() - 1]),
+    );
+    let across = (left - right).try_normalize(1e-9)?;
+    let view = across.cross(&Vector::y()).try_normalize(1e-9)?;
+    let up = view.cross(&across);
+
+    let mut columns: Vec<Column> = (1..COLUMN_COUNT - 1)
+        .map(|k| {
+            let fraction = k as f64 / (COLUMN_COUNT - 1) as f64;
+            let middle = nalgebra::center(
+                &at_fraction(&upper, fraction),
+                &at_fraction(&lower, fraction),
+            );
+            probe(target, fraction, &middle, &up, &view)
+        })
+        .collect();
+    for c in &mut columns {
+        weigh(c);
+    }
+    let path = best_path(&columns);
+    let found: Vec<(f64, Point, Point, f64)> = columns
+        .iter()
+        .zip(&path)
+        .filter_map(|(c, &row)| {
+            let trust = c.evidence[row];
+            let (up_place, low_place) = edges(c, row)?;
+            (trust > MIN_EVIDENCE).then_some((c.fraction, up_place, low_place, trust.min(1.0)))
+        })
+        .collect();
+    if found.len() < COLUMN_COUNT / 4 {
         return None;
     }
-    let height = |line: &[Point]| resample(line, 9).iter().map(|p| p.y).sum::<f64>();
-    let (upper, lower) = if height(&one) >= height(&other) {
-        (one, other)
-    } else {
-        (other, one)
-    };
-    Some(FaceOpening { kind, upper, lower })
+    let state = state_of(target, &found, &up);
+    Some(FaceOpening {
+        kind: opening.kind,
+        state,
+        columns: found,
+    })
 }
 
-/// Pins of the template's contact lines to the lines of the face, at equal fractions of
+fn probe(target: &Target, fraction: f64, middle: &Point, up: &Vector, view: &Vector) -> Column {
+    const BEFORE_MM: f64 = 25.0;
+    const BEHIND_MM: f64 = 20.0;
+    let hits = (0..ROW_COUNT)
+        .map(|row| {
+            let height = row as f64 * STEP_MM - HALF_HEIGHT_MM;
+            let origin = middle + up * height + view * BEFORE_MM;
+            target
+                .surface
+                .cast_ray(&origin, &-view, BEFORE_MM + BEHIND_MM)
+                .map(|hit| (BEFORE_MM - hit.distance, origin - view * hit.distance))
+        })
+        .collect();
+    Column {
+        fraction,
+        hits,
+        evidence: vec![0.0; ROW_COUNT],
+        is_gap: vec![false; ROW_COUNT],
+    }
+}
+
+/// Evidence for a parting at each row: 3 in a gap, the height of a step, twice the depth of a
+/// valley. [mm]
+fn weigh(column: &mut Column) {
+    let depth = |row: usize| column.hits[row].map_or(-1e3, |h| h.0);
+    // Skin on either side of a row: the foremost surface there.
+    let mut below = vec![f64::NEG_INFINITY; ROW_COUNT];
+    let mut above = vec![f64::NEG_INFINITY; ROW_COUNT];
+    for row in 1..ROW_COUNT {
+        below[row] = below[row - 1].max(depth(row - 1));
+        let r = ROW_COUNT - 1 - row;
+        above[r] = above[r + 1].max(depth(r + 1));
+    }
+    let mut evidence = vec![0.0; ROW_COUNT];
+    let mut is_gap = vec![false; ROW_COUNT];
+    for row in 1..ROW_COUNT - 1 {
+        let d = depth(row);
+        if d < below[row].min(above[row]) - GAP_MM {
+            is_gap[row] = true;
+            evidence[row] = 3.0;
+            continue;
+        }
+        let jump = (depth(row + 1) - d).abs();
+        if jump > JUMP_MM {
+            evidence[row] = jump.min(3.0);
+        } else if (VALLEY_ROWS..ROW_COUNT - VALLEY_ROWS).contains(&row) {
+            let valley = (depth(row - VALLEY_ROWS) + depth(row + VALLEY_ROWS)) / 2.0 - d;
+            evidence[row] = (2.0 * valley).clamp(0.0, 2.0);
+        }
+    }
+    column.evidence = evidence;
+    column.is_gap = is_gap;
+}
+
+/// Row of each column: most evidence, least movement from column to column, close to where it
+/// is expected.
+fn best_path(columns: &[Column]) -> Vec<usize> {
+    const MOVE_COST: f64 = 0.25;
+    const PLACE_COST: f64 = 0.004;
+    let middle = (ROW_COUNT / 2) as f64;
+    let own = |c: &Column, row: usize| c.evidence[row] - PLACE_COST * (row as f64 - middle).abs();
+    let mut score: Vec<f64> = (0..ROW_COUNT).map(|r| own(&columns[0], r)).collect();
+    let mut from: Vec<Vec<usize>> = Vec::new();
+    for c in &columns[1..] {
+        let mut next = vec![f64::NEG_INFINITY; ROW_COUNT];
+        let mut back = vec![0; ROW_COUNT];
+        for row in 0..ROW_COUNT {
+            for previous in row.saturating_sub(4)..(row + 5).min(ROW_COUNT) {
+                let s = score[previous] - MOVE_COST * row.abs_diff(previous) as f64;
+                if s > next[row] {
+                    next[row] = s;
+                    back[row] = previous;
+                }
+            }
+            next[row] += own(c, row);
+        }
+        score = next;
+        from.push(back);
+    }
+    let mut row = (0..ROW_COUNT)
+        .max_by(|&a, &b| score[a].total_cmp(&score[b]))
+        .unwrap_or(0);
+    let mut path = vec![row];
+    for back in from.iter().rev() {
+        row = back[row];
+        path.push(row);
+    }
+    path.reverse();
+    path
+}
+
+/// Upper and lower place of a parting at `row`: the ends of the gap, the two sides of the
+/// step, or the same place twice.
+fn edges(column: &Column, row: usize) -> Option<(Point, Point)> {
+    let place = |r: usize| column.hits.get(r).copied().flatten().map(|h| h.1);
+    if column.is_gap[row] {
+        let up = (row..ROW_COUNT).find(|&r| !column.is_gap[r])?;
+        let down = (0..row).rev().find(|&r| !column.is_gap[r])?;
+        return Some((place(up)?, place(down)?));
+    }
+    let here = place(row)?;
+    let next = place(row + 1)?;
+    let is_step = match (column.hits[row], column.hits[row + 1]) {
+        (Some(a), Some(b)) => (a.0 - b.0).abs() > JUMP_MM,
+        _ => true,
+    };
+    Some(if is_step { (next, here) } else { (here, here) })
+}
+
+/// Open when the way from lip to lip along the surface is much longer than through the air.
+fn state_of(target: &Target, found: &[(f64, Point, Point, f64)], up: &Vector) -> OpeningState {
+    const BESIDE_MM: f64 = 2.0;
+    let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
+    let mut open_count = 0;
+    let middle: Vec<_> = found.iter().filter(|c| (c.0 - 0.5).abs() < 0.25).collect();
+    for column in middle.iter().step_by(3) {
+        let above = nearest_vertex(target, &(column.1 + up * BESIDE_MM));
+        let below = nearest_vertex(target, &(column.2 - up * BESIDE_MM));
+        let direct = (target.positions[above as usize] - target.positions[below as usize]).norm();
+        let limit = 2.5 * direct + 6.0;
+        if !is_within(target, &topology, above, below, limit) {
+            open_count += 1;
+        }
+    }
+    if 2 * open_count > middle.iter().step_by(3).count() {
+        OpeningState::Open
+    } else {
+        OpeningState::Fused
+    }
+}
+
+fn nearest_vertex(target: &Target, point: &Point) -> u32 {
+    let at = target.surface.closest(point);
+    let corners = target.triangles[at.triangle as usize];
+    let k = (0..3)
+        .max_by(|&a, &b| at.barycentric[a].total_cmp(&at.barycentric[b]))
+        .unwrap_or(0);
+    corners[k]
+}
+
+/// Whether `to` can be reached from `from` along edges within `limit`.
+fn is_within(target: &Target, topology: &Topology, from: u32, to: u32, limit: f64) -> bool {
+    let mut distance = std::collections::BTreeMap::from([(from, 0.0f64)]);
+    let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
+    while let Some(Reverse((bits, v))) = queue.pop() {
+        if v == to {
+            return true;
+        }
+        let d = f64::from_bits(bits);
+        if distance.get(&v).is_some_and(|&known| d > known) {
+            continue;
+        }
+        for &n in topology.neighbours(v) {
+            let step = d + (target.positions[n as usize] - target.positions[v as usize]).norm();
+            if step <= limit && distance.get(&n).is_none_or(|&known| step < known) {
+                distance.insert(n, step);
+                queue.push(Reverse((step.to_bits(), n)));
+            }
+        }
+    }
+    false
+}
+
+/// Pins of the template's contact lines to the partings of the face, at equal fractions of
 /// their lengths from corner to corner.
 pub(super) fn opening_pins(
     model: &FaceModel<'_>,
@@ -94,7 +285,7 @@ pub(super) fn opening_pins(
         let Some(opening) = model.openings.iter().find(|o| o.kind == face.kind) else {
             continue;
         };
-        for (line, points) in [(&opening.upper, &face.upper), (&opening.lower, &face.lower)] {
+        for (line, is_upper) in [(&opening.upper, true), (&opening.lower, false)] {
             let own: Vec<Point> = line.iter().map(|&v| vertices[v as usize]).collect();
             let total = length_of(&own);
             let mut walked = 0.0;
@@ -103,34 +294,37 @@ pub(super) fn opening_pins(
                     walked += (own[k] - own[k - 1]).norm();
                 }
                 let fraction = if total > 0.0 { walked / total } else { 0.0 };
-                pins.push(Pin {
-                    vertex,
-                    place: at_fraction(points, fraction),
-                    weight,
-                });
+                if let Some((place, trust)) = place_at(face, fraction, is_upper) {
+                    pins.push(Pin {
+                        vertex,
+                        place,
+                        weight: weight * trust,
+                    });
+                }
             }
         }
     }
     pins
 }
 
-fn middle(points: &[Point]) -> Point {
-    Point::from(points.iter().map(|p| p.coords).sum::<Vector>() / points.len().max(1) as f64)
+/// Place of one side between the columns around a fraction; `None` where columns are missing.
+fn place_at(face: &FaceOpening, fraction: f64, is_upper: bool) -> Option<(Point, f64)> {
+    let k = face.columns.partition_point(|c| c.0 < fraction);
+    let (a, b) = (face.columns.get(k.checked_sub(1)?)?, face.columns.get(k)?);
+    if b.0 - a.0 > 3.0 / (COLUMN_COUNT - 1) as f64 {
+        return None;
+    }
+    let t = (fraction - a.0) / (b.0 - a.0);
+    let (p, q) = if is_upper { (a.1, b.1) } else { (a.2, b.2) };
+    Some((p + (q - p) * t, a.3 + (b.3 - a.3) * t))
 }
 
 fn length_of(line: &[Point]) -> f64 {
     line.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
 }
 
-fn perimeter(ring: &[Point]) -> f64 {
-    match (ring.first(), ring.last()) {
-        (Some(a), Some(b)) => length_of(ring) + (b - a).norm(),
-        _ => 0.0,
-    }
-}
-
 /// The point at a fraction of a line's length.
-pub(super) fn at_fraction(line: &[Point], fraction: f64) -> Point {
+fn at_fraction(line: &[Point], fraction: f64) -> Point {
     let mut left = fraction.clamp(0.0, 1.0) * length_of(line);
     for w in line.windows(2) {
         let step = (w[1] - w[0]).norm();
@@ -142,39 +336,53 @@ pub(super) fn at_fraction(line: &[Point], fraction: f64) -> Point {
     line[line.len() - 1]
 }
 
-fn resample(line: &[Point], count: usize) -> Vec<Point> {
-    (0..count)
-        .map(|k| at_fraction(line, k as f64 / (count - 1) as f64))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A wall z = depth(y) with a parting at y = `at`.
+    fn column(depth: impl Fn(f64) -> Option<f64>) -> Column {
+        let mut c = Column {
+            fraction: 0.5,
+            hits: (0..ROW_COUNT)
+                .map(|r| {
+                    let y = r as f64 * STEP_MM - HALF_HEIGHT_MM;
+                    depth(y).map(|z| (z, Point::new(0.0, y, z)))
+                })
+                .collect(),
+            evidence: Vec::new(),
+            is_gap: Vec::new(),
+        };
+        weigh(&mut c);
+        c
+    }
+
+    fn parting(c: Column) -> (Point, Point) {
+        let row = best_path(std::slice::from_ref(&c))[0];
+        edges(&c, row).expect("a parting")
+    }
+
     #[test]
-    fn a_ring_is_split_at_its_corners_whatever_its_start_and_direction() {
-        let ring: Vec<Point> = (0..20)
-            .map(|k| {
-                let a = f64::from(k) / 20.0 * std::f64::consts::TAU;
-                Point::new(20.0 * a.cos(), 5.0 * a.sin(), 100.0)
-            })
-            .collect();
-        for turn in [0, 7, 13] {
-            let mut chain = ring.clone();
-            chain.rotate_left(turn);
-            for _ in 0..2 {
-                chain.reverse();
-                let found = split(OpeningKind::Mouth, &chain).expect("two lines");
-                assert!((found.upper[0].x + 20.0).abs() < 1e-9);
-                assert!((found.lower[0].x + 20.0).abs() < 1e-9);
-                assert!(
-                    (at_fraction(&found.upper, 0.5) - Point::new(0.0, 5.0, 100.0)).norm() < 1e-9
-                );
-                assert!(
-                    (at_fraction(&found.lower, 0.5) - Point::new(0.0, -5.0, 100.0)).norm() < 1e-9
-                );
+    fn gap_step_and_valley_are_found_where_they_are() {
+        let (up, low) = parting(column(|y| {
+            if (y - 1.0).abs() < 2.0 {
+                None
+            } else {
+                Some(-0.1 * y.abs())
             }
-        }
+        }));
+        assert!((up.y - 3.0).abs() <= STEP_MM && (low.y + 1.0).abs() <= STEP_MM);
+        let (up, low) = parting(column(|y| Some(if y > -2.1 { 2.0 } else { 0.0 })));
+        assert!((up.y + 2.1).abs() <= STEP_MM && (low.y + 2.1).abs() <= STEP_MM);
+        assert!(up.y > low.y && up.z > low.z);
+        let (up, low) = parting(column(|y| Some(-(1.5 - (y - 3.0).abs()).max(0.0))));
+        assert_eq!(up, low);
+        assert!((up.y - 3.0).abs() <= STEP_MM);
+    }
+
+    #[test]
+    fn a_smooth_wall_has_no_parting() {
+        let c = column(|y| Some(-0.01 * y * y));
+        assert!(c.evidence.iter().all(|e| *e < MIN_EVIDENCE));
     }
 }

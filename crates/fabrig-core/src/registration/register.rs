@@ -185,11 +185,10 @@ pub fn register(
     let target = target_of(&cleaned, start.piece, &to_head)?;
     let measures = measure(&model, &target, &positions)?;
     let state = |kind: OpeningKind| {
-        if openings.iter().any(|o| o.kind == kind) {
-            OpeningState::Open
-        } else {
-            OpeningState::Fused
-        }
+        openings
+            .iter()
+            .find(|o| o.kind == kind)
+            .map_or(OpeningState::Fused, |o| o.state)
     };
     let landmark_distances = (!landmarks.names.is_empty()).then(|| {
         DistanceStatistics::from_distances(

@@ -7,7 +7,6 @@ use crate::{Point, Vector};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Match {
     pub(super) place: SurfacePoint,
-    pub(super) normal: Vector,
     /// Whether the place lies on the rim of the face's mesh: the true counterpart may be
     /// beyond it.
     pub(super) is_on_boundary: bool,
@@ -19,7 +18,6 @@ pub(super) struct Target {
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) normals: Vec<Vector>,
     pub(super) surface: Surface,
-    pub(super) boundary_loops: Vec<Vec<u32>>,
     is_boundary: Vec<bool>,
 }
 
@@ -32,7 +30,6 @@ impl Target {
         Ok(Self {
             normals: vertex_normals(&positions, &triangles),
             surface: Surface::new(&positions, &triangles)?,
-            boundary_loops: topology.boundary_loops(),
             is_boundary: topology.boundary_mask(),
             positions,
             triangles,
@@ -59,11 +56,6 @@ impl Target {
             && place.barycentric.iter().any(|b| *b < 1e-9);
         Some(Match {
             place,
-            normal: self
-                .surface
-                .blend(&place, &self.normals)
-                .try_normalize(0.0)
-                .unwrap_or(*normal),
             is_on_boundary,
         })
     }
