@@ -42,6 +42,8 @@ const STAGES: [(f64, f64); 7] = [
     (1.5, 45.0),
 ];
 const ROUNDS_PER_STAGE: usize = 3;
+/// Matches within this distance are never outliers. [mm]
+const MIN_LIMIT_MM: f64 = 8.0;
 
 /// Deforms the template onto the target; `pins` gives the pins for the current positions, and
 /// is told where a stage begins.
@@ -183,8 +185,9 @@ fn node_matches(
         .collect();
     let distances: Vec<f64> = found.iter().map(|f| f.3).collect();
     let (median, deviation) = median_and_deviation(&distances);
-    let limit = median + 3.0 * deviation.max(0.3);
-    let sigma = (2.0 * median).max(1.0);
+    // Most of a face fits soon; what lags behind (a longer nose) is no outlier yet.
+    let limit = (median + 3.0 * deviation).max(MIN_LIMIT_MM);
+    let sigma = (3.0 * median).max(0.5 * MIN_LIMIT_MM);
     found
         .into_iter()
         .filter(|f| f.3 <= limit)

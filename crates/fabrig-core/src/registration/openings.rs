@@ -23,8 +23,8 @@ const HALF_HEIGHT_MM: f64 = 9.0;
 const STEP_MM: f64 = 0.25;
 /// Rows of a column.
 const ROW_COUNT: usize = (2.0 * HALF_HEIGHT_MM / STEP_MM) as usize + 1;
-/// What lies this far behind the skin beside it is seen through a gap. [mm]
-const GAP_MM: f64 = 3.0;
+/// What lies this far behind the skin beside it is inside the head. [mm]
+const THROUGH_MM: f64 = 5.0;
 /// Neighbouring rays that differ by more see two surfaces. [mm]
 const JUMP_MM: f64 = 0.9;
 /// A valley is judged against the skin this many rows above and below.
@@ -37,9 +37,11 @@ const MIN_EVIDENCE: f64 = 0.12;
 pub(super) struct FaceOpening {
     pub(super) kind: OpeningKind,
     pub(super) state: OpeningState,
-    /// Fraction from the right corner (-X) to the left one, upper place, lower place, trust.
-    pub(super) columns: Vec<(f64, Point, Point, f64)>,
+    pub(super) columns: Vec<FoundColumn>,
 }
+
+/// Fraction from the right corner (-X) to the left one, upper place, lower place, trust.
+type FoundColumn = (f64, Point, Point, f64);
 
 /// Finds the partings of all openings, given the template deformed so far.
 pub(super) fn find_openings(
@@ -61,6 +63,8 @@ struct Column {
     hits: Vec<Option<(f64, Point)>>,
     evidence: Vec<f64>,
     is_gap: Vec<bool>,
+    /// Gaps so deep that one looks inside.
+    is_through: Vec<bool>,
 }
 
 fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceOpening> {
@@ -89,7 +93,7 @@ fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceO
         weigh(c);
     }
     let path = best_path(&columns);
-    let found: Vec<(f64, Point, Point, f64)> = columns
+    let found: Vec<FoundColumn> = columns
         .iter()
         .zip(&path)
         .filter_map(|(c, &row)| {
@@ -101,7 +105,7 @@ fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceO
     if found.len() < COLUMN_COUNT / 4 {
         return None;
     }
-    let state = state_of(target, &found, &up);
+    let state = state_of(target, &columns, &path, &found, &up, (left - right).norm());
     Some(FaceOpening {
         kind: opening.kind,
         state,
@@ -127,40 +131,49 @@ fn probe(target: &Target, fraction: f64, middle: &Point, up: &Vector, view: &Vec
         hits,
         evidence: vec![0.0; ROW_COUNT],
         is_gap: vec![false; ROW_COUNT],
+        is_through: vec![false; ROW_COUNT],
     }
 }
 
 /// Evidence for a parting at each row: 3 in a gap, the height of a step, twice the depth of a
 /// valley. [mm]
+///
+/// A gap is a run of rows between a drop and a rise, seen from below, that lies deeper than
+/// the skin at both its ends; a crease slopes down without a drop.
 fn weigh(column: &mut Column) {
     let depth = |row: usize| column.hits[row].map_or(-1e3, |h| h.0);
-    // Skin on either side of a row: the foremost surface there.
-    let mut below = vec![f64::NEG_INFINITY; ROW_COUNT];
-    let mut above = vec![f64::NEG_INFINITY; ROW_COUNT];
-    for row in 1..ROW_COUNT {
-        below[row] = below[row - 1].max(depth(row - 1));
-        let r = ROW_COUNT - 1 - row;
-        above[r] = above[r + 1].max(depth(r + 1));
+    let mut behind = vec![0.0; ROW_COUNT];
+    let mut start = None;
+    for row in 0..ROW_COUNT - 1 {
+        let step = depth(row + 1) - depth(row);
+        if step < -JUMP_MM && start.is_none() {
+            start = Some(row + 1);
+        } else if step > JUMP_MM {
+            if let Some(first) = start.take() {
+                let skin = depth(first - 1).min(depth(row + 1));
+                for r in first..=row {
+                    behind[r] = (skin - depth(r)).max(0.0);
+                }
+            }
+        }
     }
     let mut evidence = vec![0.0; ROW_COUNT];
-    let mut is_gap = vec![false; ROW_COUNT];
     for row in 1..ROW_COUNT - 1 {
-        let d = depth(row);
-        if d < below[row].min(above[row]) - GAP_MM {
-            is_gap[row] = true;
-            evidence[row] = 3.0;
-            continue;
-        }
-        let jump = (depth(row + 1) - d).abs();
-        if jump > JUMP_MM {
-            evidence[row] = jump.min(3.0);
+        let jump = (depth(row + 1) - depth(row)).abs();
+        evidence[row] = if behind[row] > JUMP_MM {
+            3.0
+        } else if jump > JUMP_MM {
+            jump.min(3.0)
         } else if (VALLEY_ROWS..ROW_COUNT - VALLEY_ROWS).contains(&row) {
-            let valley = (depth(row - VALLEY_ROWS) + depth(row + VALLEY_ROWS)) / 2.0 - d;
-            evidence[row] = (2.0 * valley).clamp(0.0, 2.0);
-        }
+            let beside = (depth(row - VALLEY_ROWS) + depth(row + VALLEY_ROWS)) / 2.0;
+            (2.0 * (beside - depth(row))).clamp(0.0, 2.0)
+        } else {
+            0.0
+        };
     }
+    column.is_gap = behind.iter().map(|b| *b > JUMP_MM).collect();
+    column.is_through = behind.iter().map(|b| *b > THROUGH_MM).collect();
     column.evidence = evidence;
-    column.is_gap = is_gap;
 }
 
 /// Row of each column: most evidence, least movement from column to column, close to where it
@@ -218,22 +231,38 @@ fn edges(column: &Column, row: usize) -> Option<(Point, Point)> {
     Some(if is_step { (next, here) } else { (here, here) })
 }
 
-/// Open when the way from lip to lip along the surface is much longer than through the air.
-fn state_of(target: &Target, found: &[(f64, Point, Point, f64)], up: &Vector) -> OpeningState {
+/// Open where a gap is seen between the sides, or where the way from side to side along the
+/// surface is nearly as long as the way round a corner; closed and fused otherwise.
+fn state_of(
+    target: &Target,
+    columns: &[Column],
+    path: &[usize],
+    found: &[FoundColumn],
+    up: &Vector,
+    width: f64,
+) -> OpeningState {
     const BESIDE_MM: f64 = 2.0;
-    let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
-    let mut open_count = 0;
-    let middle: Vec<_> = found.iter().filter(|c| (c.0 - 0.5).abs() < 0.25).collect();
-    for column in middle.iter().step_by(3) {
-        let above = nearest_vertex(target, &(column.1 + up * BESIDE_MM));
-        let below = nearest_vertex(target, &(column.2 - up * BESIDE_MM));
-        let direct = (target.positions[above as usize] - target.positions[below as usize]).norm();
-        let limit = 2.5 * direct + 6.0;
-        if !is_within(target, &topology, above, below, limit) {
-            open_count += 1;
-        }
+    let through_count = columns
+        .iter()
+        .zip(path)
+        .filter(|(c, row)| c.is_through[**row])
+        .count();
+    if 2 * through_count > columns.len() {
+        return OpeningState::Open;
     }
-    if 2 * open_count > middle.iter().step_by(3).count() {
+    let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
+    let middle: Vec<_> = found.iter().filter(|c| (c.0 - 0.5).abs() < 0.13).collect();
+    let open_count = middle
+        .iter()
+        .filter(|column| {
+            let above = nearest_vertex(target, &(column.1 + up * BESIDE_MM));
+            let below = nearest_vertex(target, &(column.2 - up * BESIDE_MM));
+            let direct =
+                (target.positions[above as usize] - target.positions[below as usize]).norm();
+            !is_within(target, &topology, above, below, direct + 0.55 * width)
+        })
+        .count();
+    if 2 * open_count > middle.len() {
         OpeningState::Open
     } else {
         OpeningState::Fused
@@ -352,6 +381,7 @@ mod tests {
                 .collect(),
             evidence: Vec::new(),
             is_gap: Vec::new(),
+            is_through: Vec::new(),
         };
         weigh(&mut c);
         c

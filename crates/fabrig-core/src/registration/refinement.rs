@@ -38,6 +38,8 @@ const ROUNDS: [(f64, f64); 12] = [
     (2.7, 45.0),
     (2.5, 45.0),
 ];
+/// Matches within this distance are never outliers, however well the rest fits. [mm]
+const MIN_LIMIT_MM: f64 = 4.0;
 /// Vertices of the face that pull on the template, at most.
 const PULLING_COUNT: usize = 9000;
 
@@ -203,9 +205,8 @@ fn vertex_matches(
         .collect();
     let distances: Vec<f64> = found.iter().map(|f| f.3).collect();
     let (median, deviation) = median_and_deviation(&distances);
-    // A deviation of next to nothing (nearly done) must not throw good matches out.
-    let limit = median + 3.0 * deviation.max(0.4);
-    let sigma = (3.0 * median).max(1.0);
+    let limit = (median + 3.0 * deviation).max(MIN_LIMIT_MM);
+    let sigma = (3.0 * median).max(0.5 * MIN_LIMIT_MM);
     found
         .into_iter()
         .filter(|f| f.3 <= limit)
@@ -267,8 +268,8 @@ fn pulls(
         .collect();
     let distances: Vec<f64> = found.iter().map(|f| f.1).collect();
     let (median, deviation) = median_and_deviation(&distances);
-    let limit = median + 3.0 * deviation.max(0.4);
-    let sigma = (3.0 * median).max(1.0);
+    let limit = (median + 3.0 * deviation).max(MIN_LIMIT_MM);
+    let sigma = (3.0 * median).max(0.5 * MIN_LIMIT_MM);
     Ok(found
         .into_iter()
         .filter(|f| f.1 <= limit)
