@@ -20,6 +20,7 @@ mod clean;
 mod closest_grid;
 mod error;
 mod face_model;
+mod hidden;
 mod mapping;
 mod node_graph;
 mod nonrigid_icp;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::alignment::align;
 use super::clean::{CleanMesh, clean, closed_volume};
 use super::face_model::{FaceModel, OpeningKind, Role};
+use super::hidden::settle_hidden;
 use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
@@ -144,13 +145,14 @@ pub fn register(
 
     clock.step("refine", 0.65)?;
     let openings = find_openings(&model, &target, &coarse);
-    let refined = refine(
+    let mut refined = refine(
         &model,
         &target,
         &coarse,
         &|vertices| pins.at(&model, &openings, vertices, 10.0),
         |share| clock.step("refine", 0.65 + 0.25 * share),
     )?;
+    settle_hidden(&model, &mut refined)?;
     clock.finish("refine");
 
     clock.step("map", 0.9)?;
