@@ -28,6 +28,8 @@ pub mod recording;
 pub mod registration;
 #[cfg(feature = "render")]
 pub mod render;
+pub mod rig;
+pub mod scene;
 pub mod skin;
 pub mod template;
 pub mod transfer;

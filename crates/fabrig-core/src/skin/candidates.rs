@@ -1,6 +1,7 @@
 //! Which nodes a skin vertex may hang on.
 
 use crate::anatomy::{Patch, PatchChart};
+use crate::skin::FitOptions;
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
 
@@ -15,8 +16,10 @@ pub struct Candidate {
 
 /// Normals further apart than this belong to different sheets of skin (cosine).
 const LEAST_NORMAL_COSINE: f64 = -0.3;
-/// Rings of grid neighbours taken around the nearest node of a patch, and the patches taken.
-const RINGS: i64 = 1;
+/// Regions of inner skin, whose flesh is covered by outer skin: names start with these.
+const CAVITIES: [&str; 3] = ["mouth_interior", "socket", "nostril"];
+/// Inner skin looks for nodes this much further, since distance is to the outer skin.
+const CAVITY_REACH: f64 = 1.5;
 
 struct Anchor {
     /// The place on the skin above the node. [mm]
@@ -35,6 +38,8 @@ pub struct CandidateFinder<'a> {
     bounds: Vec<(Point, Point)>,
     /// Patches a vertex may hang on at once.
     patch_limit: usize,
+    /// Rings of the grid taken around the nearest node of a patch.
+    rings: i64,
     /// No node further away than this is taken. [mm]
     reach: f64,
 }
@@ -43,15 +48,13 @@ impl<'a> CandidateFinder<'a> {
     /// Prepares the patches as they lie on the template.
     ///
     /// - `normals`: of the template's skin vertices; `triangles`: of its skin
-    /// - `reach`: no node further away is taken [mm]
-    /// - `patch_limit`: patches that one vertex may hang on
+    /// - `options`: how far and how many
     pub fn new(
         template: &'a Template,
         triangles: &[[u32; 3]],
         normals: &[Vector],
         patches: &'a [Patch],
-        reach: f64,
-        patch_limit: usize,
+        options: &FitOptions,
     ) -> Self {
         let positions = template.skin.positions();
         let mut anchors = Vec::new();
@@ -90,25 +93,61 @@ impl<'a> CandidateFinder<'a> {
             anchors,
             starts,
             bounds,
-            patch_limit,
-            reach,
+            patch_limit: options.patch_limit,
+            rings: i64::from(options.rings),
+            reach: options.reach,
         }
     }
 
     /// Nodes that a vertex of the template may hang on: of the nearest patches, the node
     /// nearest to it and the grid around that, all on its own side of lips and lids.
+    ///
+    /// Skin of a cavity (the inside of the cheeks, behind the lids, in the nostrils), or that
+    /// faces away from all patches near it, hangs on the flesh between it and the outer skin.
     pub fn find(&self, vertex: usize, normal: &Vector) -> Vec<Candidate> {
-        let point = self.template.skin.positions()[vertex];
         let region = self.template.regions.vertex_regions[vertex];
-        let is_allowed = |anchor: &Anchor| {
-            !self.template.regions.are_apart(region, anchor.region)
-                && anchor.normal.dot(normal) >= LEAST_NORMAL_COSINE
+        if !self.is_cavity(region) {
+            let outer = self.find_where(vertex, self.reach, |anchor| {
+                !self.template.regions.are_apart(region, anchor.region)
+                    && anchor.normal.dot(normal) >= LEAST_NORMAL_COSINE
+            });
+            if outer.iter().any(|c| c.distance < 0.5 * self.reach) {
+                return outer;
+            }
+        }
+        self.find_where(vertex, CAVITY_REACH * self.reach, |anchor| {
+            !self.is_opposite(region, anchor.region)
+        })
+    }
+
+    fn is_cavity(&self, region: RegionId) -> bool {
+        let name = &self.template.regions.regions[region.0 as usize].name;
+        CAVITIES.iter().any(|cavity| name.starts_with(cavity))
+    }
+
+    /// Whether two regions are apart for another reason than lying back to back.
+    fn is_opposite(&self, a: RegionId, b: RegionId) -> bool {
+        let side = |region: RegionId| {
+            let name = &self.template.regions.regions[region.0 as usize].name;
+            ["upper", "lower"].into_iter().find(|side| name.contains(side))
         };
+        self.template.regions.are_apart(a, b)
+            && (side(a).is_some() && side(b).is_some()
+                || self.is_cavity(a) == self.is_cavity(b))
+    }
+
+    fn find_where(
+        &self,
+        vertex: usize,
+        reach: f64,
+        is_allowed: impl Fn(&Anchor) -> bool,
+    ) -> Vec<Candidate> {
+        let point = self.template.skin.positions()[vertex];
         let mut nearest: Vec<(f64, usize, usize)> = Vec::new();
         for patch in 0..self.charts.len() {
             let (low, high) = &self.bounds[patch];
             let outside = (low - point).sup(&(point - high)).sup(&Vector::zeros());
-            if outside.norm() >= self.reach {
+            if outside.norm() >= reach {
                 continue;
             }
             let best = (self.starts[patch]..self.starts[patch + 1])
@@ -116,7 +155,7 @@ impl<'a> CandidateFinder<'a> {
                 .map(|a| ((self.anchors[a].point - point).norm_squared(), a))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((distance, anchor)) = best
-                && distance < self.reach * self.reach
+                && distance < reach * reach
             {
                 nearest.push((distance, patch, anchor));
             }
@@ -128,7 +167,7 @@ impl<'a> CandidateFinder<'a> {
             for a in self.grid_around(patch, anchor - self.starts[patch]) {
                 let anchor = &self.anchors[a];
                 let distance = (anchor.point - point).norm();
-                if distance < self.reach && is_allowed(anchor) {
+                if distance < reach && is_allowed(anchor) {
                     found.push(Candidate {
                         node: a as u32,
                         distance,
@@ -150,8 +189,8 @@ impl<'a> CandidateFinder<'a> {
         let (u_count, v_count) = (i64::from(grid.u_count), i64::from(grid.v_count));
         let (u, v) = (node as i64 % u_count, node as i64 / u_count);
         let mut around = Vec::new();
-        for dv in -RINGS..=RINGS {
-            for du in -RINGS..=RINGS {
+        for dv in -self.rings..=self.rings {
+            for du in -self.rings..=self.rings {
                 let (mut u, v) = (u + du, v + dv);
                 if grid.is_periodic {
                     u = u.rem_euclid(u_count);

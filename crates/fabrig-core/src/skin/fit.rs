@@ -27,6 +27,8 @@ pub struct FitOptions {
     pub reach: f64,
     /// Patches that one vertex may hang on.
     pub patch_limit: usize,
+    /// Rings of the grid taken around the nearest node of each of them.
+    pub rings: u32,
     /// Nodes a vertex keeps in the end.
     pub node_limit: usize,
     /// Pull towards the prior, as a mean squared motion over all poses. [mm^2]
@@ -40,6 +42,7 @@ impl Default for FitOptions {
         Self {
             reach: 16.0,
             patch_limit: 5,
+            rings: 1,
             node_limit: 24,
             ridge: 1.0,
             smoothing_rounds: 2,

@@ -115,6 +115,16 @@ impl<'a> ShapeSampler<'a> {
         delta
     }
 
+    /// Blends values given per skin vertex at the place of a node.
+    pub fn blend(&self, node: &SurfaceNode, values: &[Vector]) -> Vector {
+        let corners = self.triangles[node.triangle as usize];
+        corners
+            .iter()
+            .zip(node.barycentric)
+            .map(|(&v, weight)| values[v as usize] * weight)
+            .sum()
+    }
+
     /// Checks that every node of the charts lies on this template.
     ///
     /// # Errors

@@ -1,0 +1,198 @@
+//! The rig: a face that is ready to move, saved and loaded as one file.
+//!
+//! [`build`] assembles it from a face mesh, its place on the template and the template; it
+//! knows nothing of time. [`Rig::targets`] evaluates Eq. 3 for all patches.
+
+mod assemble;
+mod error;
+mod file;
+mod parts;
+mod sockets;
+
+pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self, template_weights};
+pub use error::RigError;
+pub use file::FORMAT_VERSION;
+pub use parts::RigPart;
+
+use nalgebra::{Point3, Similarity3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::Point;
+use crate::anatomy::{GridShape, Patch};
+use crate::mesh::Mesh;
+use crate::skin::{NodeAffine, SkinBinding};
+use crate::template::{EyeSocket, JawHinge};
+use crate::transfer::{
+    EyeShapes, JawMode, JawPose, JawShapes, PatchTransfer, ShapeWeights, TransferContext,
+    TransferError,
+};
+
+/// The lower jaw of a face.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigJaw {
+    /// Its hinge.
+    pub hinge: JawHinge,
+    /// Size against the template's, which scales its slides.
+    pub scale: f64,
+    /// Shapes that move it.
+    pub shapes: JawShapes,
+    /// How patches follow it.
+    pub mode: JawMode,
+}
+
+/// A patch of a face with its muscle shapes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RigPatch {
+    /// The patch as it lies under this face. [mm, head frame]
+    pub patch: Patch,
+    /// Its shapes on this face.
+    pub transfer: PatchTransfer,
+}
+
+/// A face that is ready to move.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rig {
+    /// Name of the template that it was made with.
+    pub template: String,
+    /// Names of the template's shapes, in the order of weights.
+    pub shape_names: Vec<String>,
+    /// The user's mesh, in its own units and vertex order.
+    pub face: Mesh,
+    /// From the mesh's units to the head frame in millimetres.
+    pub to_head: Similarity3<f64>,
+    /// The face in the template's topology. [mm, head frame]
+    pub positions: Vec<Point>,
+    /// Muscles and fat.
+    pub patches: Vec<RigPatch>,
+    /// Which nodes move which vertices of the face.
+    pub binding: SkinBinding,
+    /// The lower jaw.
+    pub jaw: RigJaw,
+    /// Left eye, right eye.
+    pub eyes: [EyeSocket; 2],
+    /// Shapes that turn the eyeballs.
+    pub eye_shapes: [EyeShapes; 2],
+    /// Pieces of the mesh that move rigidly: eyeballs, teeth, tongue.
+    pub parts: Vec<RigPart>,
+    /// Text of the template's `materials.toml`.
+    pub materials: String,
+    /// What registration reported about this face, as JSON; empty where there was none.
+    pub registration_report: String,
+}
+
+impl Rig {
+    /// Index of a shape in lists of weights.
+    pub fn shape_index(&self, name: &str) -> Option<usize> {
+        self.shape_names.iter().position(|n| n == name)
+    }
+
+    /// Grid and neutral nodes of every patch. [mm, head frame]
+    pub fn neutral_nodes(&self) -> Vec<(GridShape, Vec<Point3<f32>>)> {
+        self.patches
+            .iter()
+            .map(|p| {
+                let nodes = p.patch.neutral.iter().map(|q| q.cast()).collect();
+                (p.patch.chart.grid, nodes)
+            })
+            .collect()
+    }
+
+    /// The user's mesh in the head frame. [mm], shape [face vertex_count]
+    pub fn skin_at_rest(&self) -> Vec<Point3<f32>> {
+        self.face
+            .positions()
+            .iter()
+            .map(|p| (self.to_head * p).cast())
+            .collect()
+    }
+
+    /// What all patches share when Eq. 3 is evaluated.
+    pub fn transfer_context(&self) -> TransferContext<'_> {
+        TransferContext {
+            hinge: &self.jaw.hinge,
+            jaw_shapes: &self.jaw.shapes,
+            jaw_mode: self.jaw.mode,
+            eyes: &self.eyes,
+        }
+    }
+
+    /// Checks weights before they are used: one per shape, all finite.
+    ///
+    /// # Errors
+    ///
+    /// [`TransferError::WeightCount`], [`TransferError::WeightNotFinite`].
+    pub fn check_weights(&self, weights: &[f32]) -> Result<(), TransferError> {
+        if weights.len() != self.shape_names.len() {
+            return Err(TransferError::WeightCount {
+                expected: self.shape_names.len(),
+                found: weights.len(),
+            });
+        }
+        match weights.iter().position(|w| !w.is_finite()) {
+            None => Ok(()),
+            Some(shape) => Err(TransferError::WeightNotFinite {
+                shape,
+                value: weights[shape],
+            }),
+        }
+    }
+
+    /// Eq. 3 on every patch: where the muscle shapes want the nodes, and how fast that moves.
+    ///
+    /// `out` holds one list of positions [mm, head frame] and one of velocities [mm/s] a
+    /// patch; they are resized.
+    ///
+    /// # Errors
+    ///
+    /// [`TransferError`] where weights are not one finite number per shape, or `out` is not
+    /// one buffer per patch.
+    pub fn targets(
+        &self,
+        at: ShapeWeights<'_>,
+        out: &mut [(Vec<Point3<f32>>, Vec<Vector3<f32>>)],
+    ) -> Result<(), TransferError> {
+        self.check_weights(at.weights)?;
+        if let Some(rates) = at.rates {
+            self.check_weights(rates)?;
+        }
+        if out.len() != self.patches.len() {
+            return Err(TransferError::PatchCount {
+                expected: self.patches.len(),
+                found: out.len(),
+            });
+        }
+        let context = self.transfer_context();
+        self.patches
+            .par_iter()
+            .zip(out)
+            .for_each(|(patch, (positions, velocities))| {
+                let neutral: Vec<Point3<f32>> =
+                    patch.patch.neutral.iter().map(|q| q.cast()).collect();
+                positions.resize(neutral.len(), Point3::origin());
+                velocities.resize(neutral.len(), Vector3::zeros());
+                patch
+                    .transfer
+                    .evaluate(&context, &neutral, at, positions, velocities);
+            });
+        Ok(())
+    }
+
+    /// Where the mandible stands under the given weights.
+    pub fn jaw_pose(&self, weights: &[f32]) -> JawPose {
+        JawPose::at(&self.jaw.hinge, &self.jaw.shapes, self.jaw.scale, weights)
+    }
+
+    /// What the mandible does to space under the given weights.
+    pub fn mandible(&self, weights: &[f32]) -> NodeAffine {
+        let pose = self.jaw_pose(weights);
+        if pose.angle == 0.0 && pose.slide == crate::Vector::zeros() {
+            return NodeAffine::identity();
+        }
+        let (rotation, shift) = pose.affine(&self.jaw.hinge);
+        NodeAffine {
+            turn: (rotation - nalgebra::Matrix3::identity()).cast(),
+            shift: shift.cast(),
+        }
+    }
+}

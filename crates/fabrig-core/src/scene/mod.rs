@@ -1,0 +1,12 @@
+//! Scenes: what to model around a rig, and stepping it through a take.
+
+mod chain_loss;
+mod description;
+mod error;
+mod head;
+mod simulation;
+
+pub use chain_loss::{LossFigures, ShapeLoss, contour_vertices, shape_loss};
+pub use description::{Dynamics, EyeSource, Scene};
+pub use error::SceneError;
+pub use simulation::{FacePose, FrameReport, PartPose, Simulation};

@@ -1,0 +1,485 @@
+//! Stepping a rig through a take.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::anatomy::Attachment;
+use crate::cloth::{
+    Cloth, ClothAttachment, ClothPatch, FrameInput, HeadMotion, Materials, PatchMotion, StepReport,
+};
+use crate::motion::{Clip, EyeAngles, Sample};
+use crate::rig::Rig;
+use crate::scene::head::{head_motion, head_to_world};
+use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
+use crate::skin::SkinDeformer;
+use crate::template::RigidBody;
+use crate::transfer::ShapeWeights;
+use crate::{Point, Vector};
+
+/// Distance in time over which the motion of the head is differentiated. [s]
+const HEAD_STEP: f64 = 1.0 / 60.0;
+
+/// What drives a face at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FacePose {
+    /// Weight of each shape of the rig, in its order.
+    pub weights: Vec<f32>,
+    /// Rate of each weight. [1/s]
+    pub rates: Vec<f32>,
+    /// From the head frame to the world. [mm]
+    pub head: Isometry3<f64>,
+    /// How the head frame moves.
+    pub head_motion: HeadMotion,
+    /// Where the eyes look, where the take says so.
+    pub eyes: Option<[EyeAngles; 2]>,
+    /// Velocity of the air relative to the head, in world axes. [mm/s]
+    pub wind: Vector,
+}
+
+impl FacePose {
+    /// The neutral face of a rig with `shape_count` shapes.
+    pub fn neutral(shape_count: usize) -> Self {
+        Self {
+            weights: vec![0.0; shape_count],
+            rates: vec![0.0; shape_count],
+            head: Isometry3::identity(),
+            head_motion: HeadMotion::default(),
+            eyes: None,
+            wind: Vector::zeros(),
+        }
+    }
+}
+
+/// What a frame took and did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameReport {
+    /// Time on the take's axis at the end of the frame. [s]
+    pub time: f64,
+    /// Evaluating the muscle shapes. [ms]
+    pub targets_ms: f64,
+    /// The cloth. [ms]
+    pub cloth_ms: f64,
+    /// The skin. [ms]
+    pub skin_ms: f64,
+    /// What the cloth reported; all zero without dynamics.
+    pub step: StepReport,
+    /// Root mean square distance of the nodes from their muscle shapes. [mm]
+    pub settle_rms: f64,
+    /// Largest of these distances. [mm]
+    pub settle_max: f64,
+}
+
+/// Where a rigid piece of the face stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartPose {
+    /// Index in [`Rig::parts`].
+    pub part: usize,
+    /// From rest to now. [mm, head frame]
+    pub motion: Isometry3<f64>,
+}
+
+/// A rig on its way through time.
+pub struct Simulation {
+    rig: Arc<Rig>,
+    scene: Scene,
+    clip: Option<Clip>,
+    /// For each shape of the rig the channel of the clip that drives it.
+    channels: Vec<Option<usize>>,
+    time: f64,
+    pose: FacePose,
+    sample: Sample,
+    cloth: Option<Cloth>,
+    evaluated: Vec<(Vec<Point3<f32>>, Vec<Vector3<f32>>)>,
+    targets: Vec<PatchMotion>,
+    anchors: Vec<PatchMotion>,
+    anchor_nodes: Vec<Vec<u32>>,
+    deformer: SkinDeformer,
+    skin: Vec<Point3<f32>>,
+}
+
+impl Simulation {
+    /// Puts a rig into a scene, at the first frame of a clip (or neutral without one).
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] where the rig's materials or sizes do not fit.
+    pub fn new(rig: Arc<Rig>, scene: Scene, clip: Option<Clip>) -> Result<Self, SceneError> {
+        let names: Vec<&str> = rig.shape_names.iter().map(String::as_str).collect();
+        let channels = clip
+            .as_ref()
+            .map_or_else(|| vec![None; names.len()], |c| c.channel_indices(&names));
+        let materials = Materials::parse(&rig.materials)?;
+        let mut patches = Vec::with_capacity(rig.patches.len());
+        let mut anchor_nodes = Vec::with_capacity(rig.patches.len());
+        for patch in &rig.patches {
+            let chart = &patch.patch.chart;
+            let attachments: Vec<ClothAttachment> =
+                chart.attachments.iter().map(to_cloth_attachment).collect();
+            anchor_nodes.push(
+                attachments
+                    .iter()
+                    .filter_map(|a| match a {
+                        ClothAttachment::Anchors { nodes, .. } => Some(nodes),
+                        ClothAttachment::Patch { .. } => None,
+                    })
+                    .flatten()
+                    .copied()
+                    .collect::<Vec<u32>>(),
+            );
+            patches.push(ClothPatch {
+                shape: chart.grid,
+                rest: patch.patch.neutral.iter().map(|q| q.cast()).collect(),
+                material: *materials.get(&chart.material)?,
+                attachments,
+            });
+        }
+        let cloth = match scene.dynamics {
+            Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
+            Dynamics::None => None,
+        };
+        let skin = rig.skin_at_rest();
+        let deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
+        let count = rig.patches.len();
+        let time = clip.as_ref().map_or(0.0, |c| c.times()[0]);
+        let mut simulation = Self {
+            pose: FacePose::neutral(rig.shape_names.len()),
+            rig,
+            scene,
+            clip,
+            channels,
+            time,
+            sample: Sample::default(),
+            cloth,
+            evaluated: vec![(Vec::new(), Vec::new()); count],
+            targets: vec![PatchMotion::default(); count],
+            anchors: vec![PatchMotion::default(); count],
+            anchor_nodes,
+            deformer,
+            skin,
+        };
+        let start = simulation.pose_at(time);
+        simulation.reset(start)?;
+        Ok(simulation)
+    }
+
+    /// What the clip says at a time; the pose held last where there is no clip.
+    pub fn pose_at(&mut self, time: f64) -> FacePose {
+        let Some(clip) = &self.clip else {
+            return self.pose.clone();
+        };
+        clip.sample_into(time, &mut self.sample);
+        let sample = &self.sample;
+        let pick = |of: &[f32]| -> Vec<f32> {
+            self.channels
+                .iter()
+                .map(|c| c.map_or(0.0, |c| of[c]))
+                .collect()
+        };
+        let mut pose = FacePose {
+            weights: pick(&sample.weights),
+            rates: pick(&sample.rates),
+            eyes: sample.eyes,
+            wind: sample.wind + self.scene.wind.cast::<f64>(),
+            ..FacePose::neutral(0)
+        };
+        if self.scene.head_motion && !clip.tracks().head.is_empty() {
+            let pivot = self.scene.neck_pivot;
+            let now = head_to_world(&sample.head, &pivot);
+            let mut at = |time| {
+                clip.sample_into(time, &mut self.sample);
+                head_to_world(&self.sample.head, &pivot)
+            };
+            let (before, after) = (at(time - HEAD_STEP), at(time + HEAD_STEP));
+            let (motion, velocity) = head_motion(&before, &now, &after, HEAD_STEP);
+            pose.head = now;
+            pose.head_motion = motion;
+            pose.wind -= velocity;
+        }
+        pose
+    }
+
+    /// Puts the face into a pose at once: patches on their muscle shapes, moving as they do.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] where weights do not fit the rig.
+    pub fn reset(&mut self, pose: FacePose) -> Result<(), SceneError> {
+        self.evaluate(pose)?;
+        if let Some(cloth) = &mut self.cloth {
+            cloth.reset(&self.targets, &self.anchors)?;
+        }
+        self.move_skin()
+    }
+
+    /// Goes `dt` seconds on along the clip.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] for a time step that is not positive; the face is then unchanged.
+    pub fn advance(&mut self, dt: f64) -> Result<FrameReport, SceneError> {
+        check_dt(dt)?;
+        let pose = self.pose_at(self.time + dt);
+        self.advance_to(pose, dt)
+    }
+
+    /// Goes `dt` seconds on to a pose that the caller gives: for live input.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError`] for a time step that is not positive or weights that do not fit the
+    /// rig; the face is then unchanged.
+    pub fn advance_to(&mut self, pose: FacePose, dt: f64) -> Result<FrameReport, SceneError> {
+        check_dt(dt)?;
+        let mut report = FrameReport::default();
+        let clock = Instant::now();
+        self.evaluate(pose)?;
+        report.targets_ms = milliseconds(clock);
+
+        let clock = Instant::now();
+        if let Some(cloth) = &mut self.cloth {
+            let to_head = self.pose.head.rotation.inverse();
+            report.step = cloth.step(&FrameInput {
+                dt,
+                targets: &self.targets,
+                anchors: &self.anchors,
+                gravity: Some((to_head * self.scene.gravity.cast::<f64>()).cast()),
+                wind: (to_head * self.pose.wind).cast(),
+                head: self.pose.head_motion,
+            })?;
+        }
+        report.cloth_ms = milliseconds(clock);
+
+        let clock = Instant::now();
+        self.move_skin()?;
+        report.skin_ms = milliseconds(clock);
+
+        self.time += dt;
+        report.time = self.time;
+        (report.settle_rms, report.settle_max) = self.settle_error();
+        Ok(report)
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &Arc<Rig> {
+        &self.rig
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Time on the clip's axis. [s]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// What drives the face now.
+    pub fn pose(&self) -> &FacePose {
+        &self.pose
+    }
+
+    /// The user's mesh now, in its vertex order, before the head's own motion.
+    /// [mm, head frame]
+    pub fn skin(&self) -> &[Point3<f32>] {
+        &self.skin
+    }
+
+    /// The user's mesh now, in its own units and place; bit for bit as it was where nothing
+    /// moves it.
+    pub fn skin_in_own_units(&self) -> Vec<Point> {
+        let to_own = self.rig.to_head.inverse();
+        self.rig
+            .face
+            .positions()
+            .iter()
+            .zip(&self.skin)
+            .zip(self.deformer.rest())
+            .map(|((own, now), rest)| own + to_own * (now - rest).cast::<f64>())
+            .collect()
+    }
+
+    /// From the head frame to the world. [mm]
+    pub fn head(&self) -> &Isometry3<f64> {
+        &self.pose.head
+    }
+
+    /// Nodes of a patch now. [mm, head frame]
+    ///
+    /// # Panics
+    ///
+    /// If there is no such patch.
+    pub fn patch_positions(&self, patch: usize) -> &[Point3<f32>] {
+        match &self.cloth {
+            Some(cloth) => cloth.positions(patch),
+            None => &self.targets[patch].positions,
+        }
+    }
+
+    /// Where the muscle shapes want the nodes of a patch now. [mm, head frame]
+    ///
+    /// # Panics
+    ///
+    /// If there is no such patch.
+    pub fn patch_targets(&self, patch: usize) -> &[Point3<f32>] {
+        &self.targets[patch].positions
+    }
+
+    /// Where a rigid body stands against rest. [mm, head frame]
+    pub fn body(&self, body: RigidBody) -> Isometry3<f64> {
+        match body {
+            RigidBody::Skull => Isometry3::identity(),
+            RigidBody::Mandible => {
+                let hinge = &self.rig.jaw.hinge;
+                let pose = self.rig.jaw_pose(&self.pose.weights);
+                let axis = nalgebra::Unit::new_normalize(hinge.axis);
+                let turn = UnitQuaternion::from_axis_angle(&axis, pose.angle);
+                about(&hinge.center, turn, pose.slide)
+            }
+            RigidBody::EyeLeft => self.eye(0),
+            RigidBody::EyeRight => self.eye(1),
+        }
+    }
+
+    /// Where the rigid pieces of the user's mesh stand.
+    pub fn parts(&self) -> Vec<PartPose> {
+        self.rig
+            .parts
+            .iter()
+            .enumerate()
+            .map(|(part, piece)| PartPose {
+                part,
+                motion: self.body(piece.follows),
+            })
+            .collect()
+    }
+
+    /// Root mean square and largest distance of the nodes from their muscle shapes. [mm]
+    pub fn settle_error(&self) -> (f64, f64) {
+        let (mut sum, mut count, mut largest) = (0.0, 0usize, 0.0f64);
+        for (patch, target) in self.targets.iter().enumerate() {
+            for (now, wanted) in self.patch_positions(patch).iter().zip(&target.positions) {
+                let distance = f64::from((now - wanted).norm());
+                sum += distance * distance;
+                largest = largest.max(distance);
+            }
+            count += target.positions.len();
+        }
+        ((sum / count.max(1) as f64).sqrt(), largest)
+    }
+
+    /// Evaluates Eq. 3 at a pose and takes the pose.
+    fn evaluate(&mut self, pose: FacePose) -> Result<(), SceneError> {
+        let at = ShapeWeights {
+            weights: &pose.weights,
+            rates: Some(&pose.rates),
+        };
+        self.rig.targets(at, &mut self.evaluated)?;
+        self.pose = pose;
+        for (target, (positions, velocities)) in self.targets.iter_mut().zip(&mut self.evaluated) {
+            std::mem::swap(&mut target.positions, positions);
+            std::mem::swap(&mut target.velocities, velocities);
+        }
+        for ((anchors, target), nodes) in
+            self.anchors.iter_mut().zip(&self.targets).zip(&self.anchor_nodes)
+        {
+            // Bone holds a node where the muscle shapes put it: the shapes are the artist's
+            // word, the bone keeps the node from swinging.
+            anchors.positions.clear();
+            anchors.velocities.clear();
+            for &node in nodes {
+                anchors.positions.push(target.positions[node as usize]);
+                anchors.velocities.push(target.velocities[node as usize]);
+            }
+        }
+        Ok(())
+    }
+
+    fn move_skin(&mut self) -> Result<(), SceneError> {
+        let nodes: Vec<&[Point3<f32>]> = (0..self.targets.len())
+            .map(|patch| match &self.cloth {
+                Some(cloth) => cloth.positions(patch),
+                None => self.targets[patch].positions.as_slice(),
+            })
+            .collect();
+        let mandible = self.rig.mandible(&self.pose.weights);
+        self.deformer
+            .deform(&self.rig.binding, &nodes, mandible, &mut self.skin)?;
+        for part in self.parts() {
+            if part.motion == Isometry3::identity() {
+                continue;
+            }
+            let motion = part.motion.cast::<f32>();
+            for &vertex in &self.rig.parts[part.part].vertices {
+                let v = vertex as usize;
+                self.skin[v] = motion * self.deformer.rest()[v];
+            }
+        }
+        Ok(())
+    }
+
+    fn eye(&self, eye: usize) -> Isometry3<f64> {
+        let tracked = match self.scene.eyes {
+            EyeSource::Tracked => self.pose.eyes.map(|eyes| eyes[eye]),
+            EyeSource::Shapes => None,
+        };
+        let socket = &self.rig.eyes[eye];
+        let angles = tracked.unwrap_or_else(|| {
+            let weight = |k: usize| {
+                let shape = self.rig.eye_shapes[eye].look[k];
+                shape.map_or(0.0, |s| f64::from(self.pose.weights[s as usize]))
+            };
+            let [up, down, inward, outward] =
+                std::array::from_fn(|k| weight(k) * socket.look_angles[k]);
+            // Outwards is to the character's left for the left eye.
+            let outwards = if eye == 0 { 1.0 } else { -1.0 };
+            EyeAngles {
+                yaw: outwards * (outward - inward),
+                pitch: down - up,
+            }
+        });
+        let turn = UnitQuaternion::from_axis_angle(&Vector::y_axis(), angles.yaw)
+            * UnitQuaternion::from_axis_angle(&Vector::x_axis(), angles.pitch);
+        about(&socket.center, turn, Vector::zeros())
+    }
+}
+
+fn about(center: &Point, turn: UnitQuaternion<f64>, slide: Vector) -> Isometry3<f64> {
+    let shift = center.coords - turn * center.coords + slide;
+    Isometry3::from_parts(Translation3::from(shift), turn)
+}
+
+fn to_cloth_attachment(attachment: &Attachment) -> ClothAttachment {
+    match attachment {
+        Attachment::Body {
+            nodes, strength, ..
+        } => ClothAttachment::Anchors {
+            nodes: nodes.clone(),
+            strength: *strength,
+        },
+        Attachment::Patch {
+            patch,
+            pairs,
+            strength,
+        } => ClothAttachment::Patch {
+            patch: *patch,
+            pairs: pairs.clone(),
+            strength: *strength,
+        },
+    }
+}
+
+fn check_dt(dt: f64) -> Result<(), SceneError> {
+    if dt > 0.0 && dt.is_finite() {
+        Ok(())
+    } else {
+        Err(SceneError::TimeStep { dt })
+    }
+}
+
+fn milliseconds(clock: Instant) -> f64 {
+    clock.elapsed().as_secs_f64() * 1e3
+}
