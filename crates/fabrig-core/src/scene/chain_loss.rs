@@ -4,10 +4,14 @@
 //! Each shape at weight 1 goes through muscle shapes, patches (with or without cloth) and
 //! skin, and is compared, vertex by vertex, with the shape itself.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use crate::mesh::Topology;
+use crate::rig::Rig;
+use crate::scene::{FacePose, Scene, SceneError, Simulation};
 use crate::template::{RegionId, Template};
 
 /// A vertex moves where a shape displaces it by this much. [mm]
@@ -57,6 +61,64 @@ pub struct ShapeLoss {
     pub contours: LossFigures,
     /// Over the vertices that the shape leaves still: what leaks.
     pub still: LossFigures,
+    /// Root mean square distance of the patches from their muscle shapes. [mm]
+    pub settle_rms: f64,
+}
+
+/// Step with which a pose is held. [s]
+const HOLD_STEP: f64 = 1.0 / 60.0;
+/// A face holds still once no skin vertex moves this much in a step. [mm]
+const STILL: f32 = 2e-4;
+/// Steps after which a face is taken as it is.
+const LONGEST_HOLD: usize = 240;
+
+/// Holds a pose until the face is still, or four seconds long.
+///
+/// # Errors
+///
+/// [`SceneError`] where the pose does not fit the rig.
+pub fn hold_pose(simulation: &mut Simulation, pose: &FacePose) -> Result<(), SceneError> {
+    simulation.reset(pose.clone())?;
+    let mut before = simulation.skin().to_vec();
+    for _ in 0..LONGEST_HOLD {
+        simulation.advance_to(pose.clone(), HOLD_STEP)?;
+        let moves = before
+            .iter()
+            .zip(simulation.skin())
+            .any(|(a, b)| (a - b).norm() > STILL);
+        if !moves {
+            break;
+        }
+        before.copy_from_slice(simulation.skin());
+    }
+    Ok(())
+}
+
+/// Holds each shape of a template on a rig of the template itself and compares.
+///
+/// The rig's face must be the template's skin, vertex by vertex (registered or not).
+///
+/// # Errors
+///
+/// [`SceneError`] where the rig does not fit.
+pub fn chain_loss(
+    rig: &Arc<Rig>,
+    template: &Template,
+    scene: &Scene,
+) -> Result<Vec<ShapeLoss>, SceneError> {
+    let contours = contour_vertices(template);
+    let mut simulation = Simulation::new(Arc::clone(rig), scene.clone(), None)?;
+    let rest = rig.skin_at_rest();
+    (0..template.shapes.len())
+        .map(|shape| {
+            let mut pose = FacePose::neutral(template.shapes.len());
+            pose.weights[shape] = 1.0;
+            hold_pose(&mut simulation, &pose)?;
+            let mut loss = shape_loss(template, &contours, shape, &rest, simulation.skin());
+            loss.settle_rms = simulation.settle_error().0;
+            Ok(loss)
+        })
+        .collect()
 }
 
 /// Contours of lips and lids: where the skin of a lip or lid ends at the mouth or the eye.
@@ -110,5 +172,6 @@ pub fn shape_loss(
         contours: LossFigures::of(on_contours.map(error).collect()),
         moved: LossFigures::of(moved.into_iter().map(error).collect()),
         still: LossFigures::of(still.into_iter().map(error).collect()),
+        settle_rms: 0.0,
     }
 }

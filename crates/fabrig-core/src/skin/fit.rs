@@ -40,11 +40,11 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         Self {
-            reach: 16.0,
-            patch_limit: 5,
-            rings: 1,
+            reach: 18.0,
+            patch_limit: 8,
+            rings: 2,
             node_limit: 24,
-            ridge: 1.0,
+            ridge: 0.3,
             smoothing_rounds: 2,
         }
     }
