@@ -21,6 +21,7 @@
 pub mod anatomy;
 pub mod atomic_file;
 pub mod cloth;
+mod error;
 pub mod facs;
 pub mod mesh;
 pub mod motion;
@@ -33,6 +34,8 @@ pub mod scene;
 pub mod skin;
 pub mod template;
 pub mod transfer;
+
+pub use error::Error;
 
 /// A position, double precision. [mm] unless stated.
 pub type Point = nalgebra::Point3<f64>;

@@ -4,9 +4,9 @@ use nalgebra::Similarity3;
 
 use crate::anatomy::{self, Patch, Resolution};
 use crate::mesh::{Mesh, SurfacePoint};
+use crate::registration::{Registration, RigidComponent};
 use crate::rig::parts::name_parts;
 use crate::rig::sockets::{fit_eyes, fit_hinge};
-use crate::registration::{Registration, RigidComponent};
 use crate::rig::{Rig, RigError, RigJaw, RigPatch};
 use crate::skin::{
     CandidateFinder, FitOptions, NodeAffine, NodeFrames, Pose, SkinBinding, TemplateWeights,
@@ -134,7 +134,14 @@ pub fn build(
         shapes.clone(),
         &template.eyes,
     );
-    let transfers = transfer_all(template, &template_patches, &patches, positions, shapes, &eyes);
+    let transfers = transfer_all(
+        template,
+        &template_patches,
+        &patches,
+        positions,
+        shapes,
+        &eyes,
+    );
 
     let weights = fit_weights(template, &template_patches, &on_self, options);
     let is_rigid = rigid_mask(face.vertex_count(), &parts);
@@ -282,13 +289,7 @@ fn fit_weights(
 ) -> TemplateWeights {
     let triangles = template.skin.triangles();
     let normals = smoothed_normals(template.skin.positions(), &triangles, 0);
-    let finder = CandidateFinder::new(
-        template,
-        &triangles,
-        &normals,
-        patches,
-        &options.fit,
-    );
+    let finder = CandidateFinder::new(template, &triangles, &normals, patches, &options.fit);
     let poser = TemplatePoser {
         template,
         transfers,

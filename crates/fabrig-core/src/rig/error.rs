@@ -56,7 +56,9 @@ pub enum RigError {
         found: u32,
     },
     /// The file ends too early, or goes on too long.
-    #[error("the rig file has {found} bytes where its header says {expected}: it is cut or damaged")]
+    #[error(
+        "the rig file has {found} bytes where its header says {expected}: it is cut or damaged"
+    )]
     Length {
         /// What the header says.
         expected: u64,

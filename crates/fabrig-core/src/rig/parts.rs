@@ -35,10 +35,7 @@ pub(super) fn name_parts(
             RigidBody::EyeLeft => "eye_l",
             RigidBody::EyeRight => "eye_r",
         };
-        let same = parts
-            .iter()
-            .filter(|p| p.follows == component.body)
-            .count();
+        let same = parts.iter().filter(|p| p.follows == component.body).count();
         parts.push(RigPart {
             name: if same == 0 {
                 name.to_owned()
@@ -49,7 +46,10 @@ pub(super) fn name_parts(
             vertices: component.vertices.clone(),
         });
     }
-    for (eye, body) in [RigidBody::EyeLeft, RigidBody::EyeRight].into_iter().enumerate() {
+    for (eye, body) in [RigidBody::EyeLeft, RigidBody::EyeRight]
+        .into_iter()
+        .enumerate()
+    {
         let ball = parts
             .iter()
             .filter(|p| p.follows == body)

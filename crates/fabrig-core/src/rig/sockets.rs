@@ -26,8 +26,8 @@ pub(super) fn fit_hinge(template: &Template, positions: &[Point]) -> (JawHinge, 
     }
     let scale = template.landmarks.get("pogonion").map_or(1.0, |&chin| {
         let chin = chin as usize;
-        let ratio = (positions[chin] - hinge.center).norm()
-            / (rest[chin] - template.jaw.center).norm();
+        let ratio =
+            (positions[chin] - hinge.center).norm() / (rest[chin] - template.jaw.center).norm();
         if ratio.is_finite() { ratio } else { 1.0 }
     });
     (hinge, scale)
@@ -55,7 +55,11 @@ pub(super) fn fit_eyes(template: &Template, positions: &[Point]) -> [EyeSocket; 
         };
         let (from, to) = (center(rest), center(positions));
         let ratio = size(positions, to) / size(rest, from);
-        let ratio = if ratio.is_finite() { ratio.clamp(0.5, 2.0) } else { 1.0 };
+        let ratio = if ratio.is_finite() {
+            ratio.clamp(0.5, 2.0)
+        } else {
+            1.0
+        };
         eye.center = to + ratio * (eye.center - from);
         eye.radius *= ratio;
     }

@@ -6,9 +6,7 @@ mod error;
 mod head;
 mod simulation;
 
-pub use chain_loss::{
-    LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss,
-};
+pub use chain_loss::{LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss};
 pub use description::{Dynamics, EyeSource, Scene};
 pub use error::SceneError;
 pub use simulation::{FacePose, FrameReport, PartPose, Simulation};

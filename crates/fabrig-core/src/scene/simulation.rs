@@ -383,8 +383,11 @@ impl Simulation {
             std::mem::swap(&mut target.positions, positions);
             std::mem::swap(&mut target.velocities, velocities);
         }
-        for ((anchors, target), nodes) in
-            self.anchors.iter_mut().zip(&self.targets).zip(&self.anchor_nodes)
+        for ((anchors, target), nodes) in self
+            .anchors
+            .iter_mut()
+            .zip(&self.targets)
+            .zip(&self.anchor_nodes)
         {
             // Bone holds a node where the muscle shapes put it: the shapes are the artist's
             // word, the bone keeps the node from swinging.

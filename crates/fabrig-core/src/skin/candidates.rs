@@ -40,6 +40,7 @@ pub struct CandidateFinder<'a> {
     patch_limit: usize,
     /// Rings of the grid taken around the nearest node of a patch.
     rings: i64,
+    candidate_limit: usize,
     /// No node further away than this is taken. [mm]
     reach: f64,
 }
@@ -95,6 +96,7 @@ impl<'a> CandidateFinder<'a> {
             bounds,
             patch_limit: options.patch_limit,
             rings: i64::from(options.rings),
+            candidate_limit: options.candidate_limit,
             reach: options.reach,
         }
     }
@@ -129,11 +131,12 @@ impl<'a> CandidateFinder<'a> {
     fn is_opposite(&self, a: RegionId, b: RegionId) -> bool {
         let side = |region: RegionId| {
             let name = &self.template.regions.regions[region.0 as usize].name;
-            ["upper", "lower"].into_iter().find(|side| name.contains(side))
+            ["upper", "lower"]
+                .into_iter()
+                .find(|side| name.contains(side))
         };
         self.template.regions.are_apart(a, b)
-            && (side(a).is_some() && side(b).is_some()
-                || self.is_cavity(a) == self.is_cavity(b))
+            && (side(a).is_some() && side(b).is_some() || self.is_cavity(a) == self.is_cavity(b))
     }
 
     fn find_where(
@@ -175,6 +178,8 @@ impl<'a> CandidateFinder<'a> {
                 }
             }
         }
+        found.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.node.cmp(&b.node)));
+        found.truncate(self.candidate_limit);
         found.sort_by_key(|c| c.node);
         found
     }

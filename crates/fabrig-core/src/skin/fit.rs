@@ -29,6 +29,8 @@ pub struct FitOptions {
     pub patch_limit: usize,
     /// Rings of the grid taken around the nearest node of each of them.
     pub rings: u32,
+    /// Nodes that are tried, the nearest.
+    pub candidate_limit: usize,
     /// Nodes a vertex keeps in the end.
     pub node_limit: usize,
     /// Pull towards the prior, as a mean squared motion over all poses. [mm^2]
@@ -43,6 +45,7 @@ impl Default for FitOptions {
             reach: 18.0,
             patch_limit: 8,
             rings: 2,
+            candidate_limit: 64,
             node_limit: 24,
             ridge: 0.3,
             smoothing_rounds: 2,

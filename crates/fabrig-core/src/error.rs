@@ -1,0 +1,34 @@
+//! One error over all modules, for callers who do not care which step failed.
+
+/// Any error of the crate; each shows as the module's own.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum Error {
+    #[error(transparent)]
+    Mesh(#[from] crate::mesh::MeshError),
+    #[error(transparent)]
+    MeshIo(#[from] crate::mesh::io::MeshIoError),
+    #[error(transparent)]
+    Template(#[from] crate::template::TemplateError),
+    #[error(transparent)]
+    Registration(#[from] crate::registration::RegistrationError),
+    #[error(transparent)]
+    Anatomy(#[from] crate::anatomy::AnatomyError),
+    #[error(transparent)]
+    Transfer(#[from] crate::transfer::TransferError),
+    #[error(transparent)]
+    Skin(#[from] crate::skin::SkinError),
+    #[error(transparent)]
+    Rig(#[from] crate::rig::RigError),
+    #[error(transparent)]
+    Facs(#[from] crate::facs::FacsError),
+    #[error(transparent)]
+    Motion(#[from] crate::motion::MotionError),
+    #[error(transparent)]
+    Cloth(#[from] crate::cloth::ClothError),
+    #[error(transparent)]
+    Scene(#[from] crate::scene::SceneError),
+    #[error(transparent)]
+    Recording(#[from] crate::recording::RecordingError),
+}

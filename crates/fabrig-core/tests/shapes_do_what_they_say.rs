@@ -1,0 +1,382 @@
+//! Each of the 52 shapes at weight 1 does on the demo face what its name says, in millimetres
+//! on named points of its own skin; left shapes leave the right half still, and left and right
+//! mirror each other.
+
+mod faces;
+
+use std::sync::Arc;
+
+use fabrig_core::Vector;
+use fabrig_core::scene::{Scene, Simulation};
+use fabrig_core::template::{self, RigidBody};
+
+/// The demo face in one pose.
+struct Posed {
+    rest: Vec<nalgebra::Point3<f32>>,
+    now: Vec<nalgebra::Point3<f32>>,
+    gazes: [Vector; 2],
+}
+
+struct Stage {
+    simulation: Simulation,
+}
+
+impl Stage {
+    fn new() -> Self {
+        let rig = Arc::clone(&faces::demo().rig);
+        Self {
+            simulation: Simulation::new(rig, Scene::without_dynamics(), None).unwrap(),
+        }
+    }
+
+    fn pose(&mut self, shapes: &[&str]) -> Posed {
+        let rig = &faces::demo().rig;
+        let on: Vec<(&str, f32)> = shapes.iter().map(|s| (*s, 1.0)).collect();
+        self.simulation.reset(faces::pose(rig, &on)).unwrap();
+        Posed {
+            rest: rig.skin_at_rest(),
+            now: self.simulation.skin().to_vec(),
+            gazes: [RigidBody::EyeLeft, RigidBody::EyeRight]
+                .map(|eye| self.simulation.body(eye) * Vector::z()),
+        }
+    }
+}
+
+/// The vertex of the demo face nearest to a landmark, on the landmark's side of lips and lids.
+fn vertex(landmark: &str) -> usize {
+    let template = template::human();
+    let demo = faces::demo();
+    let mark = template.landmarks[landmark] as usize;
+    let region = template.regions.vertex_regions[mark];
+    let place = demo.registration.positions[mark];
+    let distance = |v: usize| {
+        let p = demo.registration.to_head * demo.mesh.positions()[v];
+        (p - place).norm()
+    };
+    (0..demo.mesh.vertex_count())
+        .filter(|&v| {
+            !template
+                .regions
+                .are_apart(region, demo.registration.face_regions[v])
+                && !demo
+                    .rig
+                    .parts
+                    .iter()
+                    .any(|p| p.vertices.binary_search(&(v as u32)).is_ok())
+        })
+        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        .unwrap()
+}
+
+impl Posed {
+    /// Motion of a landmark. [mm]
+    fn motion(&self, landmark: &str) -> Vector {
+        let v = vertex(landmark);
+        (self.now[v] - self.rest[v]).cast()
+    }
+
+    /// Distance of two landmarks now, and at rest. [mm]
+    fn distances(&self, a: &str, b: &str) -> (f64, f64) {
+        let (a, b) = (vertex(a), vertex(b));
+        let of = |p: &[nalgebra::Point3<f32>]| f64::from((p[a] - p[b]).norm());
+        (of(&self.now), of(&self.rest))
+    }
+
+    /// Largest motion among vertices that `is_in` takes, by rest position. [mm]
+    fn largest(&self, is_in: impl Fn(&nalgebra::Point3<f32>) -> bool) -> f64 {
+        let motions = self.rest.iter().zip(&self.now).filter(|(r, _)| is_in(r));
+        motions
+            .map(|(r, n)| f64::from((n - r).norm()))
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Collects what does not hold.
+#[derive(Default)]
+struct Claims(Vec<String>);
+
+impl Claims {
+    fn more(&mut self, claim: impl Into<String>, value: f64, than: f64) {
+        if value.is_nan() || value <= than {
+            self.0
+                .push(format!("{}: {value:.2}, not over {than}", claim.into()));
+        }
+    }
+
+    fn less(&mut self, claim: impl Into<String>, value: f64, than: f64) {
+        if value.is_nan() || value >= than {
+            self.0
+                .push(format!("{}: {value:.2}, not under {than}", claim.into()));
+        }
+    }
+
+    fn settle(self) {
+        assert!(self.0.is_empty(), "\n{}", self.0.join("\n"));
+    }
+}
+
+/// (suffix of shapes, suffix of landmarks, direction of this side along x)
+const SIDES: [(&str, &str, f64); 2] = [("Left", "l", 1.0), ("Right", "r", -1.0)];
+
+#[test]
+fn eyes_and_brows() {
+    let mut stage = Stage::new();
+    let mut claims = Claims::default();
+    for (eye, (side, s, out)) in SIDES.into_iter().enumerate() {
+        let mut shape = |name: &str| {
+            (
+                format!("{name}{side}"),
+                stage.pose(&[&format!("{name}{side}")]),
+            )
+        };
+        let mark = |name: &str| format!("{name}_{s}");
+        let (upper, lower) = (mark("upper_lid_mid"), mark("lower_lid_mid"));
+
+        let (name, p) = shape("eyeBlink");
+        let (now, rest) = p.distances(&upper, &lower);
+        claims.less(
+            format!("{name} closes the aperture, share left"),
+            now / rest,
+            0.15,
+        );
+        let (name, p) = shape("eyeWide");
+        let (now, rest) = p.distances(&upper, &lower);
+        claims.more(format!("{name} opens the aperture"), now - rest, 0.8);
+        let (name, p) = shape("eyeSquint");
+        claims.more(
+            format!("{name} raises the lower lid"),
+            p.motion(&lower).y,
+            0.5,
+        );
+        let (name, p) = shape("eyeLookDown");
+        claims.less(
+            format!("{name} lowers the upper lid"),
+            p.motion(&upper).y,
+            -1.0,
+        );
+        claims.less(format!("{name} turns the eye"), p.gazes[eye].y, -0.3);
+        let (name, p) = shape("eyeLookUp");
+        claims.more(
+            format!("{name} raises the upper lid"),
+            p.motion(&upper).y,
+            0.5,
+        );
+        claims.more(format!("{name} turns the eye"), p.gazes[eye].y, 0.3);
+        let (name, p) = shape("eyeLookIn");
+        claims.less(format!("{name} turns the eye"), out * p.gazes[eye].x, -0.3);
+        let (name, p) = shape("eyeLookOut");
+        claims.more(format!("{name} turns the eye"), out * p.gazes[eye].x, 0.3);
+
+        let (name, p) = shape("browDown");
+        claims.less(
+            format!("{name} lowers the inner brow"),
+            p.motion(&mark("brow_inner")).y,
+            -2.0,
+        );
+        let (name, p) = shape("browOuterUp");
+        claims.more(
+            format!("{name} raises the outer brow"),
+            p.motion(&mark("brow_outer")).y,
+            2.0,
+        );
+        let (name, p) = shape("cheekSquint");
+        claims.more(
+            format!("{name} raises the cheek"),
+            p.motion(&mark("malar")).y,
+            1.0,
+        );
+        let (name, p) = shape("noseSneer");
+        claims.more(
+            format!("{name} raises the wing of the nose"),
+            p.motion(&mark("alar")).y,
+            1.0,
+        );
+    }
+    let p = stage.pose(&["browInnerUp"]);
+    for (_, s, _) in SIDES {
+        let rise = p.motion(&format!("brow_inner_{s}")).y;
+        claims.more(format!("browInnerUp raises the inner brow {s}"), rise, 2.0);
+    }
+    claims.settle();
+}
+
+#[test]
+fn jaw_and_mouth() {
+    let mut stage = Stage::new();
+    let mut claims = Claims::default();
+    let lips = ("upper_lip_bottom", "lower_lip_top");
+    let width = |p: &Posed| p.distances("lip_corner_l", "lip_corner_r");
+
+    let p = stage.pose(&["jawOpen"]);
+    let (open, rest) = p.distances(lips.0, lips.1);
+    claims.more("jawOpen parts the lips", open - rest, 15.0);
+    claims.less("jawOpen drops the chin", p.motion("pogonion").y, -20.0);
+    claims.less(
+        "jawOpen leaves the brow still",
+        p.motion("brow_mid_l").norm(),
+        0.1,
+    );
+    let p = stage.pose(&["jawOpen", "mouthClose"]);
+    let (closed, _) = p.distances(lips.0, lips.1);
+    claims.less(
+        "mouthClose brings the lips of an open jaw together",
+        closed - rest,
+        0.15 * open,
+    );
+    claims.less(
+        "mouthClose leaves the jaw open",
+        p.motion("pogonion").y,
+        -15.0,
+    );
+    let p = stage.pose(&["jawForward"]);
+    claims.more("jawForward", p.motion("pogonion").z, 4.0);
+    let p = stage.pose(&["jawLeft"]);
+    claims.more("jawLeft", p.motion("pogonion").x, 4.0);
+    let p = stage.pose(&["jawRight"]);
+    claims.less("jawRight", p.motion("pogonion").x, -4.0);
+
+    let p = stage.pose(&["mouthPucker"]);
+    claims.less(
+        "mouthPucker narrows the mouth",
+        width(&p).0 - width(&p).1,
+        -5.0,
+    );
+    let p = stage.pose(&["mouthFunnel"]);
+    claims.less(
+        "mouthFunnel narrows the mouth",
+        width(&p).0 - width(&p).1,
+        -3.0,
+    );
+    let (now, rest) = p.distances(lips.0, lips.1);
+    claims.more("mouthFunnel opens the lips", now - rest, 2.0);
+    claims.more(
+        "mouthFunnel pushes the lower lip out",
+        p.motion("lower_lip_mid").z,
+        1.0,
+    );
+    for (name, direction) in [("mouthLeft", 1.0), ("mouthRight", -1.0)] {
+        let p = stage.pose(&[name]);
+        claims.more(name, direction * p.motion("upper_lip_mid").x, 3.0);
+        claims.more(name, direction * p.motion("lower_lip_mid").x, 3.0);
+    }
+    let p = stage.pose(&["mouthRollLower"]);
+    claims.less(
+        "mouthRollLower turns the lower lip in",
+        p.motion("lower_lip_mid").z,
+        -1.0,
+    );
+    let p = stage.pose(&["mouthRollUpper"]);
+    claims.less(
+        "mouthRollUpper turns the upper lip in",
+        p.motion("upper_lip_mid").z,
+        -1.0,
+    );
+    let p = stage.pose(&["mouthShrugLower"]);
+    claims.more(
+        "mouthShrugLower raises the lower lip",
+        p.motion("lower_lip_mid").y,
+        1.0,
+    );
+    let p = stage.pose(&["mouthShrugUpper"]);
+    claims.more(
+        "mouthShrugUpper raises the upper lip",
+        p.motion("upper_lip_mid").y,
+        1.0,
+    );
+    let p = stage.pose(&["cheekPuff"]);
+    for (_, s, out) in SIDES {
+        let bulge = out * p.motion(&format!("cheek_{s}")).x;
+        claims.more(format!("cheekPuff fills the cheek {s}"), bulge, 3.0);
+    }
+    let p = stage.pose(&["tongueOut"]);
+    claims.less("tongueOut leaves the skin still", p.largest(|_| true), 0.01);
+
+    for (side, s, out) in SIDES {
+        let mut shape = |name: &str| {
+            (
+                format!("{name}{side}"),
+                stage.pose(&[&format!("{name}{side}")]),
+            )
+        };
+        let mark = |name: &str| format!("{name}_{s}");
+        let corner = mark("lip_corner");
+        let (name, p) = shape("mouthSmile");
+        let m = p.motion(&corner);
+        claims.more(format!("{name} raises the corner"), m.y, 4.0);
+        claims.more(format!("{name} widens"), out * m.x, 2.0);
+        claims.less(format!("{name} pulls back"), m.z, -1.0);
+        let (name, p) = shape("mouthFrown");
+        claims.less(
+            format!("{name} lowers the corner"),
+            p.motion(&corner).y,
+            -2.0,
+        );
+        let (name, p) = shape("mouthDimple");
+        claims.less(
+            format!("{name} pulls the corner back"),
+            p.motion(&corner).z,
+            -1.0,
+        );
+        let (name, p) = shape("mouthStretch");
+        claims.more(format!("{name} widens"), out * p.motion(&corner).x, 2.0);
+        let (name, p) = shape("mouthPress");
+        let (now, rest) = p.distances(&mark("upper_lip_side"), &mark("lower_lip_bottom_side"));
+        claims.less(format!("{name} makes the lips thinner"), now - rest, -0.5);
+        let (name, p) = shape("mouthLowerDown");
+        let drop = p.motion(&mark("lower_lip_bottom_side")).y;
+        claims.less(format!("{name} lowers the lower lip"), drop, -1.5);
+        let (name, p) = shape("mouthUpperUp");
+        let rise = p.motion(&mark("upper_lip_side")).y;
+        claims.more(format!("{name} raises the upper lip"), rise, 1.5);
+    }
+    claims.settle();
+}
+
+#[test]
+fn sides_keep_to_themselves_and_mirror_each_other() {
+    let mut stage = Stage::new();
+    let mut claims = Claims::default();
+    let rig = &faces::demo().rig;
+    let marks = [
+        "brow_inner_",
+        "brow_outer_",
+        "upper_lid_mid_",
+        "lower_lid_mid_",
+        "alar_",
+        "malar_",
+        "cheek_",
+        "lip_corner_",
+        "upper_lip_side_",
+        "lower_lip_bottom_side_",
+    ];
+    for left in rig
+        .shape_names
+        .iter()
+        .filter_map(|n| n.strip_suffix("Left"))
+    {
+        // jawLeft and mouthLeft move the whole mouth.
+        if left == "jaw" || left == "mouth" {
+            continue;
+        }
+        let p = stage.pose(&[&format!("{left}Left")]);
+        let q = stage.pose(&[&format!("{left}Right")]);
+        claims.less(
+            format!("{left}Left leaves the right still"),
+            p.largest(|r| r.x < -20.0),
+            0.6,
+        );
+        claims.less(
+            format!("{left}Right leaves the left still"),
+            q.largest(|r| r.x > 20.0),
+            0.6,
+        );
+        for mark in marks {
+            let m = p.motion(&format!("{mark}l"));
+            let n = q.motion(&format!("{mark}r"));
+            let difference = (m - Vector::new(-n.x, n.y, n.z)).norm();
+            let limit = 0.5 + 0.15 * m.norm();
+            claims.less(format!("{left} mirrors at {mark}"), difference, limit);
+        }
+    }
+    claims.settle();
+}
