@@ -269,10 +269,10 @@ impl Materials {
 }
 
 impl Default for Materials {
-    /// Table 2: `linear_muscle`, `sphincter`, `fat`.
+    /// Table 2: `linear`, `sphincter`, `fat`.
     fn default() -> Self {
         let table = [
-            ("linear_muscle", Material::LINEAR_MUSCLE),
+            ("linear", Material::LINEAR_MUSCLE),
             ("sphincter", Material::SPHINCTER),
             ("fat", Material::FAT),
         ];
@@ -324,7 +324,7 @@ mod tests {
     use super::*;
 
     const TABLE_2: &str = "
-        [linear_muscle]
+        [linear]
         mass = 1.0
         stretch_resistance = 10.0
         compression_resistance = 10.0
@@ -351,7 +351,7 @@ mod tests {
     fn table_2_is_read_with_defaults_for_what_it_lacks() {
         let materials = Materials::parse(TABLE_2).unwrap();
         assert_eq!(materials.get("fat"), Ok(&Material::FAT));
-        assert_eq!(materials.get("linear_muscle"), Ok(&Material::LINEAR_MUSCLE));
+        assert_eq!(materials.get("linear"), Ok(&Material::LINEAR_MUSCLE));
     }
 
     #[test]
@@ -367,7 +367,7 @@ mod tests {
         let MaterialError::Invalid { material, source } = error else {
             panic!("{error:?}");
         };
-        assert_eq!(material, "linear_muscle");
+        assert_eq!(material, "linear");
         assert!(
             source.to_string().starts_with("`damping` is NaN"),
             "{source}"
@@ -378,10 +378,6 @@ mod tests {
             Err(MaterialError::Parse(_))
         ));
         let unknown = Materials::default().get("bone").unwrap_err();
-        assert!(
-            unknown
-                .to_string()
-                .contains("fat, linear_muscle, sphincter")
-        );
+        assert!(unknown.to_string().contains("fat, linear, sphincter"));
     }
 }

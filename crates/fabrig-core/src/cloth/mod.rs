@@ -56,6 +56,7 @@
 //! Macklin, Müller & Chentanez 2016, *XPBD*; Macklin et al. 2019, *Small steps in physics
 //! simulation*; the BDF2 form and the folding of diagonal terms are fabrig's.
 
+pub mod bench;
 mod constraints;
 mod error;
 mod group;
