@@ -8,18 +8,16 @@ use nalgebra::Point3;
 use super::constraints::attachment::{OrderFreeSum, Port, anchor_pull, project_pair};
 use super::constraints::bend::{BendCompliance, bend_energy, project_bend};
 use super::constraints::damping::damping_mass;
-use super::constraints::grid_walk::{
-    cell_count, for_diagonals, for_u_edges, for_v_edges, u_edge_count, v_edge_count,
-};
+use super::constraints::grid_lists::GridLists;
 use super::constraints::inertia::{FrameForces, frame_acceleration};
 use super::constraints::magnet::Magnet;
 use super::constraints::pressure::{project_pressure, swept_volume};
 use super::constraints::shear::{project_shear, shear_energy};
 use super::constraints::stretch::{
-    RestLengths, StretchCompliance, edge_energy, edge_length, project_edge,
+    RestLengths, StretchCompliance, edge_length, project_stretch, stretch_energy,
 };
 use super::constraints::wind::{Air, add_wind};
-use super::input::{ClothOptions, ClothPatch, GridShape, Integrator, PatchMotion};
+use super::input::{ClothOptions, ClothPatch, Integrator, PatchMotion};
 use super::lanes::{Real, Vec3};
 use super::report::Energies;
 use super::time::{Stencil, hermite};
@@ -145,7 +143,6 @@ struct LaneState {
 
 /// Patches of one shape, side by side.
 pub(crate) struct Group<R> {
-    shape: GridShape,
     patches: Vec<usize>,
     integrator: Integrator,
     has_pressure: bool,
@@ -172,8 +169,8 @@ pub(crate) struct Group<R> {
     anchors: Vec<Anchor>,
     pairs: GroupPairs,
 
-    u_lengths: RestLengths<R>,
-    v_lengths: RestLengths<R>,
+    lists: GridLists,
+    edge_lengths: RestLengths<R>,
     diagonal_lengths: RestLengths<R>,
 
     displacements: Vec<Vec3<R>>,
@@ -250,7 +247,8 @@ impl<R: Real> Group<R> {
                 local.set_lane(lane, relative(p, center));
             }
         }
-        let mean_edge = mean_edge(shape, &rest);
+        let lists = GridLists::new(shape);
+        let mean_edge = mean_edge(&lists.edges, &rest);
         let area = |p: &ClothPatch| rest_area(p);
         let mut anchor_stiffness = vec![R::splat(0.0); n];
         let mut anchors = Vec::new();
@@ -275,23 +273,17 @@ impl<R: Real> Group<R> {
                 }
             }
         }
-        let blends = |count: usize, direction: u64| -> Vec<R> {
-            (0..count)
-                .map(|edge| {
-                    let noise = edge_noise(options.seed, direction, edge as u64);
+        let blends = |edges: &[[u32; 2]]| -> Vec<R> {
+            edges
+                .iter()
+                .map(|&[i, j]| {
+                    let noise = edge_noise(options.seed, i, j);
                     let blend = options.rest_blend * (1.0 + options.rest_imperfection * noise);
                     R::splat(blend.clamp(0.0, 1.0))
                 })
                 .collect()
         };
-        let mut u_list = vec![[0, 0]; u_edge_count(shape)];
-        for_u_edges(shape, |e, i, j| u_list[e] = [i, j]);
-        let mut v_list = vec![[0, 0]; v_edge_count(shape)];
-        for_v_edges(shape, |e, i, j| v_list[e] = [i, j]);
-        let mut d_list = vec![[0, 0]; 2 * cell_count(shape)];
-        for_diagonals(shape, |e, i, j| d_list[e] = [i, j]);
         Self {
-            shape,
             patches: patches.to_vec(),
             integrator: options.integrator,
             has_pressure: patches.iter().any(|&p| all[p].material.pressure > 0.0),
@@ -330,9 +322,9 @@ impl<R: Real> Group<R> {
             anchor_stiffness,
             anchors,
             pairs: GroupPairs::default(),
-            u_lengths: RestLengths::new(&rest, &u_list, blends(u_list.len(), 0)),
-            v_lengths: RestLengths::new(&rest, &v_list, blends(v_list.len(), 1)),
-            diagonal_lengths: RestLengths::new(&rest, &d_list, blends(d_list.len(), 2)),
+            edge_lengths: RestLengths::new(&rest, &lists.edges, blends(&lists.edges)),
+            diagonal_lengths: RestLengths::new(&rest, &lists.diagonals, blends(&lists.diagonals)),
+            lists,
             displacements: zero.clone(),
             previous_displacements: zero.clone(),
             velocities: zero.clone(),
@@ -437,23 +429,10 @@ impl<R: Real> Group<R> {
         }
         let half_mass = (R::splat(0.5) * self.mass).sqrt();
         self.drive = half_mass * (jerk.sqrt() * R::splat(dt) + jump.sqrt());
-        let mut stretch = R::splat(0.0);
-        let mut shear = R::splat(0.0);
-        let (lengths, ends) = (&mut self.u_lengths, &self.ends);
-        for_u_edges(self.shape, |e, i, j| {
-            let gap = lengths.begin_frame(e, edge_length(ends[i], ends[j]));
-            stretch += gap * gap;
-        });
-        let lengths = &mut self.v_lengths;
-        for_v_edges(self.shape, |e, i, j| {
-            let gap = lengths.begin_frame(e, edge_length(ends[i], ends[j]));
-            stretch += gap * gap;
-        });
-        let lengths = &mut self.diagonal_lengths;
-        for_diagonals(self.shape, |e, i, j| {
-            let gap = lengths.begin_frame(e, edge_length(ends[i], ends[j]));
-            shear += gap * gap;
-        });
+        let stretch = self.edge_lengths.begin_frame(&self.lists.edges, &self.ends);
+        let shear = self
+            .diagonal_lengths
+            .begin_frame(&self.lists.diagonals, &self.ends);
         let k = self.stretch[0].max(self.stretch[1]);
         self.mismatch = R::splat(0.5) * (k * stretch + self.shear * shear);
     }
@@ -513,7 +492,7 @@ impl<R: Real> Group<R> {
         }
         if substep.wind != [0.0; 3] {
             add_wind(
-                self.shape,
+                &self.lists.cells,
                 &self.solution,
                 &self.past,
                 Vec3::splat(substep.wind),
@@ -632,13 +611,12 @@ impl<R: Real> Group<R> {
 
     #[inline(always)]
     fn solve_lanes(&mut self, substep: &Substep) {
-        let shape = self.shape;
         let h_e2 = self.h_e * self.h_e;
         let one = R::splat(1.0);
         let progress = R::splat(substep.progress[1]);
         if self.has_pressure {
             project_pressure(
-                shape,
+                &self.lists.cells,
                 &self.targets,
                 &mut self.solution,
                 &self.inv_masses,
@@ -651,12 +629,17 @@ impl<R: Real> Group<R> {
             dropoff: self.bend_dropoff,
             inv_edge_squared: self.inv_edge_squared,
         };
-        project_bend(shape, &mut self.solution, &self.inv_masses, &bend);
+        project_bend(
+            &self.lists.triples,
+            &mut self.solution,
+            &self.inv_masses,
+            &bend,
+        );
         for (x, target) in self.solution.iter_mut().zip(&self.targets) {
             *x = *target + *x;
         }
         project_shear(
-            shape,
+            &self.lists.diagonals,
             &mut self.solution,
             &self.inv_masses,
             &self.diagonal_lengths,
@@ -668,21 +651,15 @@ impl<R: Real> Group<R> {
             compression: one / (self.stretch[1] * h_e2),
             gamma: self.stretch_damping_time / self.h_e,
         };
-        let (x, w, r) = (&mut self.solution, &self.inv_masses, &self.resting);
-        let lengths = &self.u_lengths;
-        for_u_edges(shape, |e, i, j| {
-            let rest = lengths.at(e, progress);
-            let (a, b) = project_edge(x[i], x[j], w[i], w[j], rest, r[i] - r[j], &compliance);
-            x[i] += a;
-            x[j] += b;
-        });
-        let lengths = &self.v_lengths;
-        for_v_edges(shape, |e, i, j| {
-            let rest = lengths.at(e, progress);
-            let (a, b) = project_edge(x[i], x[j], w[i], w[j], rest, r[i] - r[j], &compliance);
-            x[i] += a;
-            x[j] += b;
-        });
+        project_stretch(
+            &self.lists.edges,
+            &mut self.solution,
+            &self.inv_masses,
+            &self.edge_lengths,
+            &self.resting,
+            progress,
+            &compliance,
+        );
         self.finish_lanes();
     }
 
@@ -723,31 +700,20 @@ impl<R: Real> Group<R> {
             self.solution[i] = self.ends[i] + u;
         }
         let one = R::splat(1.0);
-        let (mut stretch, mut compression) = (R::splat(0.0), R::splat(0.0));
         let x = &self.solution;
-        let lengths = &self.u_lengths;
-        for_u_edges(self.shape, |e, i, j| {
-            let [s, c] = edge_energy(x[i], x[j], lengths.at(e, one), self.stretch);
-            stretch += s;
-            compression += c;
-        });
-        let lengths = &self.v_lengths;
-        for_v_edges(self.shape, |e, i, j| {
-            let [s, c] = edge_energy(x[i], x[j], lengths.at(e, one), self.stretch);
-            stretch += s;
-            compression += c;
-        });
-        let shear = shear_energy(self.shape, x, &self.diagonal_lengths, self.shear);
+        let [stretch, compression] =
+            stretch_energy(&self.lists.edges, x, &self.edge_lengths, self.stretch);
+        let shear = shear_energy(&self.lists.diagonals, x, &self.diagonal_lengths, self.shear);
         let bend = BendCompliance {
             compliance: one,
             dropoff: self.bend_dropoff,
             inv_edge_squared: self.inv_edge_squared,
         };
-        let bend = bend_energy(self.shape, &self.displacements, self.bend, &bend);
+        let bend = bend_energy(&self.lists.triples, &self.displacements, self.bend, &bend);
         let mut pressure = R::splat(0.0);
         if self.has_pressure {
             let volume = swept_volume(
-                self.shape,
+                &self.lists.cells,
                 &self.ends,
                 &self.displacements,
                 &mut self.gradient,
@@ -807,9 +773,8 @@ impl<R: Real> PatchGroup for Group<R> {
         self.starts.copy_from_slice(&self.ends);
         self.load_ends(1.0, targets);
         self.load_anchors(1.0, anchors);
-        pulp::Arch::new().dispatch(|| self.begin_frame_lanes(1.0));
-        self.u_lengths.hold();
-        self.v_lengths.hold();
+        vectorized(BeginFrame(self, 1.0));
+        self.edge_lengths.hold();
         self.diagonal_lengths.hold();
         for lane in 0..R::LANES {
             if !self.lane_states[lane].has_velocity {
@@ -843,24 +808,24 @@ impl<R: Real> PatchGroup for Group<R> {
         }
         self.load_anchors(dt, anchors);
         self.clamped = R::splat(0.0);
-        pulp::Arch::new().dispatch(|| self.begin_frame_lanes(dt));
+        vectorized(BeginFrame(self, dt));
     }
 
     fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>) {
-        pulp::Arch::new().dispatch(|| self.predict_lanes(substep));
+        vectorized(Predict(self, substep));
         self.write_ports(ports);
     }
 
     fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]) {
         self.solve_pairs(ports);
-        pulp::Arch::new().dispatch(|| self.solve_lanes(substep));
+        vectorized(Solve(self, substep));
         for state in &mut self.lane_states {
             state.has_history = true;
         }
     }
 
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>) {
-        let sums = pulp::Arch::new().dispatch(|| self.energy_lanes());
+        let sums = vectorized(EnergyOf(self));
         let anchors = self.anchor_energies();
         monitors.clear();
         for lane in 0..self.patches.len() {
@@ -942,16 +907,12 @@ fn relative(p: &Point3<f32>, center: [f64; 3]) -> [f64; 3] {
 }
 
 /// Mean length of the grid's edges. [mm]
-fn mean_edge<R: Real>(shape: GridShape, positions: &[Vec3<R>]) -> R {
+fn mean_edge<R: Real>(edges: &[[u32; 2]], positions: &[Vec3<R>]) -> R {
     let mut sum = R::splat(0.0);
-    let mut count = 0.0;
-    let mut visit = |_: usize, i: usize, j: usize| {
-        sum += edge_length(positions[i], positions[j]);
-        count += 1.0;
-    };
-    for_u_edges(shape, &mut visit);
-    for_v_edges(shape, &mut visit);
-    sum / R::splat(f64::max(count, 1.0))
+    for &[i, j] in edges {
+        sum += edge_length(positions[i as usize], positions[j as usize]);
+    }
+    sum / R::splat(edges.len().max(1) as f64)
 }
 
 /// Area of a patch at rest. [mm^2]
@@ -965,13 +926,43 @@ fn rest_area(patch: &ClothPatch) -> f64 {
         .sum()
 }
 
-/// Noise in [-1, 1] for an edge, the same in every patch (SplitMix64's finalizer).
-fn edge_noise(seed: u64, direction: u64, edge: u64) -> f64 {
+/// Noise in [-1, 1] for the edge of two nodes, the same in every patch (SplitMix64's
+/// finalizer).
+fn edge_noise(seed: u64, i: u32, j: u32) -> f64 {
+    let edge = (u64::from(i) << 32) | u64::from(j);
     let mut z = seed
-        .wrapping_add(direction.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        .wrapping_mul(0x9E37_79B9_7F4A_7C15)
         .wrapping_add((edge + 1).wrapping_mul(0xBF58_476D_1CE4_E5B9));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^= z >> 31;
     (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }
+
+/// Runs `work` compiled for the widest vector instructions that this processor has.
+///
+/// A closure would not do: it is compiled for the baseline unless it happens to be inlined.
+fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
+    pulp::Arch::new().dispatch(work)
+}
+
+macro_rules! vectorized_work {
+    ($name:ident<$($field:ty),*> -> $output:ty, |$group:ident, $($argument:ident)?| $body:expr) => {
+        struct $name<'a, R>(&'a mut Group<R>, $($field),*);
+
+        impl<R: Real> pulp::NullaryFnOnce for $name<'_, R> {
+            type Output = $output;
+
+            #[inline(always)]
+            fn call(self) -> $output {
+                let Self($group, $($argument)?) = self;
+                $body
+            }
+        }
+    };
+}
+
+vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
+vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
+vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
+vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());

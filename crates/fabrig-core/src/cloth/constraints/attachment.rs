@@ -54,8 +54,8 @@ impl OrderFreeSum {
     pub(crate) fn add(&mut self, correction: [f64; 3]) {
         for axis in 0..3 {
             let bounded = correction[axis].clamp(-LARGEST, LARGEST);
-            // Rounds to the nearest, alike for both signs.
-            self.sum[axis] += (bounded * UNITS_PER_MM).round() as i64;
+            // Truncation towards zero treats both signs alike.
+            self.sum[axis] += (bounded * UNITS_PER_MM) as i64;
         }
     }
 

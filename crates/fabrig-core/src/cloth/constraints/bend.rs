@@ -16,8 +16,6 @@
 //! for inextensible surfaces*, on a regular grid; projection as a vector-valued XPBD
 //! constraint (Macklin et al. 2016, eq. 18) with the dropoff at its current value.
 
-use super::grid_walk::{for_u_triples, for_v_triples};
-use crate::anatomy::GridShape;
 use crate::cloth::lanes::{Real, Vec3};
 
 /// Bending of one substep.
@@ -55,50 +53,43 @@ pub(crate) fn project_triple<R: Real>(
     s * -(part / (sum * part + bend.compliance * turned))
 }
 
-/// Projects every triple along u and then along v.
+/// Projects every triple of a grid.
 ///
 /// - `displacements` [mm], `inv_masses` [1/mass]: one per node
 #[inline(always)]
 pub(crate) fn project_bend<R: Real>(
-    shape: GridShape,
+    triples: &[[u32; 3]],
     displacements: &mut [Vec3<R>],
     inv_masses: &[R],
     bend: &BendCompliance<R>,
 ) {
     let two = R::splat(2.0);
-    let mut visit = |i: usize, j: usize, k: usize| {
+    for triple in triples {
+        let [i, j, k] = triple.map(|node| node as usize);
         let w = [inv_masses[i], inv_masses[j], inv_masses[k]];
-        let lambda = project_triple(
-            displacements[i],
-            displacements[j],
-            displacements[k],
-            w,
-            bend,
-        );
-        displacements[i] += lambda * w[0];
-        displacements[j] -= lambda * (two * w[1]);
-        displacements[k] += lambda * w[2];
-    };
-    for_u_triples(shape, &mut visit);
-    for_v_triples(shape, &mut visit);
+        let (a, b, c) = (displacements[i], displacements[j], displacements[k]);
+        let lambda = project_triple(a, b, c, w, bend);
+        displacements[i] = a + lambda * w[0];
+        displacements[j] = b - lambda * (two * w[1]);
+        displacements[k] = c + lambda * w[2];
+    }
 }
 
 /// Energy of all triples.
 #[inline(always)]
 pub(crate) fn bend_energy<R: Real>(
-    shape: GridShape,
+    triples: &[[u32; 3]],
     displacements: &[Vec3<R>],
     k: R,
     bend: &BendCompliance<R>,
 ) -> R {
     let mut sum = R::splat(0.0);
-    let mut visit = |i: usize, j: usize, l: usize| {
+    for triple in triples {
+        let [i, j, l] = triple.map(|node| node as usize);
         let s = displacements[i] + displacements[l] - displacements[j] - displacements[j];
         let q = s.dot(s) * bend.inv_edge_squared;
         sum += q * (R::splat(1.0) - bend.dropoff / (R::splat(1.0) + q));
-    };
-    for_u_triples(shape, &mut visit);
-    for_v_triples(shape, &mut visit);
+    }
     R::splat(0.5) * k / bend.inv_edge_squared * sum
 }
 
@@ -106,11 +97,7 @@ pub(crate) fn bend_energy<R: Real>(
 mod tests {
     use super::*;
 
-    const LINE: GridShape = GridShape {
-        u_count: 3,
-        v_count: 1,
-        is_periodic: false,
-    };
+    const LINE: &[[u32; 3]] = &[[0, 1, 2]];
 
     fn bend(compliance: f64, dropoff: f64) -> BendCompliance<f64> {
         BendCompliance {

@@ -8,7 +8,7 @@
 pub(crate) mod attachment;
 pub(crate) mod bend;
 pub(crate) mod damping;
-pub(crate) mod grid_walk;
+pub(crate) mod grid_lists;
 pub(crate) mod inertia;
 pub(crate) mod magnet;
 pub(crate) mod pressure;

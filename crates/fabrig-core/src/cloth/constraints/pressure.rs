@@ -13,8 +13,6 @@
 //! Source: Müller et al. 2007, *Position based dynamics*, section 4.4 (cloth balloons),
 //! written for a sheet over a base; XPBD eq. 18.
 
-use super::grid_walk::for_cells;
-use crate::anatomy::GridShape;
 use crate::cloth::lanes::{Real, Vec3};
 
 /// Volume gained [mm^3], with its gradient by node [mm^2] written into `gradient`.
@@ -22,7 +20,7 @@ use crate::cloth::lanes::{Real, Vec3};
 /// - `targets`, `displacements`: one per node [mm]
 #[inline(always)]
 pub(crate) fn swept_volume<R: Real>(
-    shape: GridShape,
+    cells: &[[u32; 4]],
     targets: &[Vec3<R>],
     displacements: &[Vec3<R>],
     gradient: &mut [Vec3<R>],
@@ -30,7 +28,8 @@ pub(crate) fn swept_volume<R: Real>(
     let (quarter, half) = (R::splat(0.25), R::splat(0.5));
     gradient.fill(Vec3::zero());
     let mut volume = R::splat(0.0);
-    for_cells(shape, |[a, b, c, d]| {
+    for cell in cells {
+        let [a, b, c, d] = cell.map(|node| node as usize);
         let middle = |i: usize| targets[i] + displacements[i] * half;
         let first = middle(c) - middle(a);
         let second = middle(d) - middle(b);
@@ -45,7 +44,7 @@ pub(crate) fn swept_volume<R: Real>(
         gradient[b] += lift - turn_second;
         gradient[c] += lift + turn_first;
         gradient[d] += lift + turn_second;
-    });
+    }
     volume
 }
 
@@ -56,14 +55,14 @@ pub(crate) fn swept_volume<R: Real>(
 /// - `gradient`: room for one vector per node
 #[inline(always)]
 pub(crate) fn project_pressure<R: Real>(
-    shape: GridShape,
+    cells: &[[u32; 4]],
     targets: &[Vec3<R>],
     displacements: &mut [Vec3<R>],
     inv_masses: &[R],
     compliance: R,
     gradient: &mut [Vec3<R>],
 ) {
-    let volume = swept_volume(shape, targets, displacements, gradient);
+    let volume = swept_volume(cells, targets, displacements, gradient);
     // A patch with no area has no gradient; the bound keeps the division finite.
     let mut bottom = compliance.max(R::splat(1e-30));
     for (g, &w) in gradient.iter().zip(inv_masses) {
@@ -82,6 +81,12 @@ pub(crate) fn project_pressure<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::anatomy::GridShape;
+    use crate::cloth::constraints::grid_lists::GridLists;
+
+    fn cells(shape: GridShape) -> Vec<[u32; 4]> {
+        GridLists::new(shape).cells
+    }
 
     fn pad(shape: GridShape, height: impl Fn(f64, f64) -> f64) -> Vec<Vec3<f64>> {
         let mut nodes = Vec::new();
@@ -105,7 +110,7 @@ mod tests {
         let targets = pad(SHAPE, |x, y| 0.1 * x * y);
         let lift = vec![Vec3::splat([0.0, 0.0, 0.5]); targets.len()];
         let mut gradient = targets.clone();
-        let volume = swept_volume(SHAPE, &targets, &lift, &mut gradient);
+        let volume = swept_volume(&cells(SHAPE), &targets, &lift, &mut gradient);
         assert!((volume - 8.0 * 6.0 * 0.5).abs() < 1e-12);
     }
 
@@ -132,7 +137,7 @@ mod tests {
         }
         let grown: Vec<_> = targets.iter().map(|p| *p * 0.1).collect();
         let mut gradient = targets.clone();
-        let volume = swept_volume(shape, &targets, &grown, &mut gradient);
+        let volume = swept_volume(&cells(shape), &targets, &grown, &mut gradient);
         let shell = 4.0 / 3.0 * std::f64::consts::PI * (11.0_f64.powi(3) - 1000.0);
         assert!((volume / shell - 1.0).abs() < 2e-3, "{volume} {shell}");
     }
@@ -152,7 +157,7 @@ mod tests {
                 })
                 .collect();
             let mut gradient = targets.clone();
-            swept_volume(SHAPE, &targets, &shift, &mut gradient);
+            swept_volume(&cells(SHAPE), &targets, &shift, &mut gradient);
             let mut scratch = targets.clone();
             for node in [0, 8, 20, 31, 62] {
                 for axis in 0..3 {
@@ -162,8 +167,8 @@ mod tests {
                     plus[node] += Vec3::splat(e);
                     let mut minus = shift.clone();
                     minus[node] -= Vec3::splat(e);
-                    let slope = (swept_volume(SHAPE, &targets, &plus, &mut scratch)
-                        - swept_volume(SHAPE, &targets, &minus, &mut scratch))
+                    let slope = (swept_volume(&cells(SHAPE), &targets, &plus, &mut scratch)
+                        - swept_volume(&cells(SHAPE), &targets, &minus, &mut scratch))
                         / 2e-5;
                     assert!((slope - gradient[node].lane(0)[axis]).abs() < 1e-7);
                 }
@@ -179,9 +184,9 @@ mod tests {
         let mut gradient = targets.clone();
         let w = vec![1.0; targets.len()];
         for _ in 0..3 {
-            project_pressure(SHAPE, &targets, &mut shift, &w, 0.0, &mut gradient);
+            project_pressure(&cells(SHAPE), &targets, &mut shift, &w, 0.0, &mut gradient);
         }
-        let volume = swept_volume(SHAPE, &targets, &shift, &mut gradient);
+        let volume = swept_volume(&cells(SHAPE), &targets, &shift, &mut gradient);
         assert!(volume.abs() < 1e-9, "{volume}");
         assert!(shift[30].z > 0.0 && shift[31].z < 0.0);
     }
@@ -191,7 +196,14 @@ mod tests {
         let targets = vec![Vec3::<f64>::zero(); 63];
         let mut shift = targets.clone();
         let mut gradient = targets.clone();
-        project_pressure(SHAPE, &targets, &mut shift, &[1.0; 63], 0.0, &mut gradient);
+        project_pressure(
+            &cells(SHAPE),
+            &targets,
+            &mut shift,
+            &[1.0; 63],
+            0.0,
+            &mut gradient,
+        );
         assert!(shift.iter().all(|u| u.dot(*u) == 0.0));
     }
 }

@@ -6,9 +6,7 @@
 //!
 //! Source: Provot 1995, *Deformation constraints in a mass-spring model*, shear springs.
 
-use super::grid_walk::for_diagonals;
 use super::stretch::{RestLengths, edge_length};
-use crate::anatomy::GridShape;
 use crate::cloth::lanes::{Real, Vec3};
 
 /// Projects one diagonal.
@@ -33,20 +31,21 @@ pub(crate) fn project_diagonal<R: Real>(
     (d * -(s * wa), d * (s * wb))
 }
 
-/// Projects every diagonal of a grid, in the order of [`for_diagonals`].
+/// Projects every diagonal of a grid.
 ///
 /// - `positions` [mm], `inv_masses` [1/mass]: one per node
 /// - `progress`: how far through the frame, 0 to 1
 #[inline(always)]
 pub(crate) fn project_shear<R: Real>(
-    shape: GridShape,
+    diagonals: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
     rest: &RestLengths<R>,
     progress: R,
     compliance: R,
 ) {
-    for_diagonals(shape, |diagonal, i, j| {
+    for (diagonal, &[i, j]) in diagonals.iter().enumerate() {
+        let (i, j) = (i as usize, j as usize);
         let (da, db) = project_diagonal(
             positions[i],
             positions[j],
@@ -57,22 +56,23 @@ pub(crate) fn project_shear<R: Real>(
         );
         positions[i] += da;
         positions[j] += db;
-    });
+    }
 }
 
 /// Energy of all diagonals, `sum k C^2 / 2`.
 #[inline(always)]
 pub(crate) fn shear_energy<R: Real>(
-    shape: GridShape,
+    diagonals: &[[u32; 2]],
     positions: &[Vec3<R>],
     rest: &RestLengths<R>,
     k: R,
 ) -> R {
     let mut sum = R::splat(0.0);
-    for_diagonals(shape, |diagonal, i, j| {
+    for (diagonal, &[i, j]) in diagonals.iter().enumerate() {
+        let (i, j) = (i as usize, j as usize);
         let c = edge_length(positions[i], positions[j]) - rest.at(diagonal, R::splat(1.0));
         sum += R::splat(0.5) * k * c * c;
-    });
+    }
     sum
 }
 
@@ -102,27 +102,23 @@ mod tests {
 
     #[test]
     fn a_sheared_square_is_pulled_upright_and_a_coincident_one_stays_finite() {
-        let shape = GridShape {
-            u_count: 2,
-            v_count: 2,
-            is_periodic: false,
-        };
+        let diagonals = [[0, 3], [1, 2]];
         let square = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let neutral: Vec<Vec3<f64>> = square
             .iter()
             .map(|p| Vec3::splat([p[0], p[1], 0.0]))
             .collect();
-        let rest = RestLengths::new(&neutral, &[[0, 3], [1, 2]], vec![0.0; 2]);
+        let rest = RestLengths::new(&neutral, &diagonals, vec![0.0; 2]);
         let mut sheared: Vec<_> = square
             .iter()
             .map(|p| Vec3::splat([p[0] + 0.3 * p[1], p[1], 0.0]))
             .collect();
-        let before = shear_energy(shape, &sheared, &rest, 2.0);
-        project_shear(shape, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
-        let after = shear_energy(shape, &sheared, &rest, 2.0);
+        let before = shear_energy(&diagonals, &sheared, &rest, 2.0);
+        project_shear(&diagonals, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
+        let after = shear_energy(&diagonals, &sheared, &rest, 2.0);
         assert!(after < 0.05 * before, "{before} -> {after}");
         let mut heap = vec![Vec3::<f64>::zero(); 4];
-        project_shear(shape, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);
+        project_shear(&diagonals, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);
         assert!(heap.iter().all(|p| p.dot(*p).is_finite()));
     }
 }

@@ -34,10 +34,10 @@ pub(crate) struct RestLengths<R> {
 
 impl<R: Real> RestLengths<R> {
     /// Lengths of `edges` in the neutral shape, with the blend of each edge.
-    pub(crate) fn new(neutral: &[Vec3<R>], edges: &[[usize; 2]], blend: Vec<R>) -> Self {
+    pub(crate) fn new(neutral: &[Vec3<R>], edges: &[[u32; 2]], blend: Vec<R>) -> Self {
         let lengths: Vec<R> = edges
             .iter()
-            .map(|&[i, j]| edge_length(neutral[i], neutral[j]))
+            .map(|&[i, j]| edge_length(neutral[i as usize], neutral[j as usize]))
             .collect();
         Self {
             start: lengths.clone(),
@@ -47,15 +47,21 @@ impl<R: Real> RestLengths<R> {
         }
     }
 
-    /// Starts a frame in whose end an edge's target has length `target`. Returns how far the
-    /// rest length will then be from it.
+    /// Starts a frame at whose end the targets are at `targets`. Returns the sum of squares by
+    /// which targets and rest lengths will then differ. [mm^2]
     #[inline(always)]
-    pub(crate) fn begin_frame(&mut self, edge: usize, target: R) -> R {
-        let neutral = self.neutral[edge];
-        let rest = neutral + self.blend[edge] * (target - neutral);
-        self.start[edge] = self.end[edge];
-        self.end[edge] = rest;
-        target - rest
+    pub(crate) fn begin_frame(&mut self, edges: &[[u32; 2]], targets: &[Vec3<R>]) -> R {
+        let mut mismatch = R::splat(0.0);
+        for (edge, &[i, j]) in edges.iter().enumerate() {
+            let target = edge_length(targets[i as usize], targets[j as usize]);
+            let neutral = self.neutral[edge];
+            let rest = neutral + self.blend[edge] * (target - neutral);
+            self.start[edge] = self.end[edge];
+            self.end[edge] = rest;
+            let gap = target - rest;
+            mismatch += gap * gap;
+        }
+        mismatch
     }
 
     /// Forgets motion: from now on rest lengths are those at the end of the frame.
@@ -118,6 +124,54 @@ pub(crate) fn project_edge<R: Real>(
     // Minus the multiplier over the length, so that `d` need not be normalized.
     let s = (c + compliance.gamma * rate) * inverse / bottom;
     (d * -(s * wa), d * (s * wb))
+}
+
+/// Projects every edge of a grid.
+///
+/// - `positions`, `resting` [mm], `inv_masses` [1/mass]: one per node; see [`project_edge`]
+/// - `progress`: how far through the frame, 0 to 1
+#[inline(always)]
+pub(crate) fn project_stretch<R: Real>(
+    edges: &[[u32; 2]],
+    positions: &mut [Vec3<R>],
+    inv_masses: &[R],
+    rest: &RestLengths<R>,
+    resting: &[Vec3<R>],
+    progress: R,
+    compliance: &StretchCompliance<R>,
+) {
+    for (edge, &[i, j]) in edges.iter().enumerate() {
+        let (i, j) = (i as usize, j as usize);
+        let (a, b) = project_edge(
+            positions[i],
+            positions[j],
+            inv_masses[i],
+            inv_masses[j],
+            rest.at(edge, progress),
+            resting[i] - resting[j],
+            compliance,
+        );
+        positions[i] += a;
+        positions[j] += b;
+    }
+}
+
+/// Energy of all edges at the end of the frame, `sum k C^2 / 2`: stretch and compression.
+#[inline(always)]
+pub(crate) fn stretch_energy<R: Real>(
+    edges: &[[u32; 2]],
+    positions: &[Vec3<R>],
+    rest: &RestLengths<R>,
+    k: [R; 2],
+) -> [R; 2] {
+    let mut sums = [R::splat(0.0); 2];
+    for (edge, &[i, j]) in edges.iter().enumerate() {
+        let (a, b) = (positions[i as usize], positions[j as usize]);
+        let [s, c] = edge_energy(a, b, rest.end[edge], k);
+        sums[0] += s;
+        sums[1] += c;
+    }
+    sums
 }
 
 /// Energy of one edge, `k C^2 / 2`, split into stretch and compression.

@@ -9,8 +9,6 @@
 //!
 //! Source: Wejchert & Haumann 1991, *Animation aerodynamics*, section 3, without shielding.
 
-use super::grid_walk::for_cells;
-use crate::anatomy::GridShape;
 use crate::cloth::lanes::{Real, Vec3};
 
 /// Coefficients of the air.
@@ -48,7 +46,7 @@ pub(crate) fn cell_force<R: Real>(air: &Air<R>, area: Vec3<R>, wind: Vec3<R>) ->
 /// - `inv_node_mass`: one over the mass of a node in the air's units [1/g]
 #[inline(always)]
 pub(crate) fn add_wind<R: Real>(
-    shape: GridShape,
+    cells: &[[u32; 4]],
     positions: &[Vec3<R>],
     velocities: &[Vec3<R>],
     wind: Vec3<R>,
@@ -57,14 +55,15 @@ pub(crate) fn add_wind<R: Real>(
     accelerations: &mut [Vec3<R>],
 ) {
     let (quarter, half) = (R::splat(0.25), R::splat(0.5));
-    for_cells(shape, |[a, b, c, d]| {
+    for cell in cells {
+        let [a, b, c, d] = cell.map(|node| node as usize);
         let area = (positions[c] - positions[a]).cross(positions[d] - positions[b]) * half;
         let velocity = (velocities[a] + velocities[b] + velocities[c] + velocities[d]) * quarter;
         let push = cell_force(air, area, wind - velocity) * (quarter * inv_node_mass);
         for node in [a, b, c, d] {
             accelerations[node] += push;
         }
-    });
+    }
 }
 
 #[cfg(test)]
