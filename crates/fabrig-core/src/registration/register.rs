@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::alignment::align;
 use super::clean::{CleanMesh, clean, closed_volume};
 use super::face_model::{FaceModel, OpeningKind, Role};
-use super::hidden::settle_hidden;
 use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
@@ -18,6 +17,7 @@ use super::openings::{FaceOpening, find_openings, opening_pins};
 use super::parts::{RigidComponent, eye_centers, recognise};
 use super::refinement::refine;
 use super::report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure};
+use super::settling::{settle_hidden, unfold};
 use super::similarity::{
     MatchedLandmarks, from_landmarks, match_landmarks, umeyama, useful_landmarks,
 };
@@ -152,6 +152,7 @@ pub fn register(
         &|vertices| pins.at(&model, &openings, vertices, 10.0),
         |share| clock.step("refine", 0.65 + 0.25 * share),
     )?;
+    unfold(&model, &mut refined)?;
     settle_hidden(&model, &mut refined)?;
     clock.finish("refine");
 

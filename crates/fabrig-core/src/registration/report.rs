@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::clean::CleaningReport;
 use super::face_model::{FaceModel, Role};
 use super::target::Target;
-use crate::Point;
 use crate::mesh::{Surface, SurfaceError, triangle_normals, vertex_normals};
+use crate::{Point, Vector};
 
 /// Distances of a set of points. [mm]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -160,31 +160,21 @@ pub(super) fn measure(
         })
         .collect();
 
-    let mut folded_triangles = 0;
-    let mut qualities = Vec::new();
-    let unit = triangle_normals(registered, &model.triangles);
-    let unit_before = triangle_normals(model.positions(), &model.triangles);
-    for (k, t) in model.triangles.iter().enumerate() {
-        if t.iter().any(|&v| model.roles[v as usize] != Role::Face) {
-            continue;
-        }
-        let around = |positions_normals: &[crate::Vector]| -> crate::Vector {
-            t.iter().map(|&v| positions_normals[v as usize]).sum()
-        };
-        // Turned against its surroundings, and not so on the template itself.
-        if unit[k].dot(&around(&normals)) < 0.0 && unit_before[k].dot(&around(&model.normals)) > 0.0
-        {
-            folded_triangles += 1;
-        }
-        let [a, b, c] = t.map(|v| registered[v as usize]);
-        let sides = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
-        qualities.push(if sides > 0.0 {
-            // 4 sqrt(3) area / sum of squared sides.
-            2.0 * 3f64.sqrt() * unit[k].norm() / sides
-        } else {
-            0.0
-        });
-    }
+    let mut qualities: Vec<f64> = model
+        .triangles
+        .iter()
+        .filter(|t| is_face_triangle(model, t))
+        .map(|t| {
+            let [a, b, c] = t.map(|v| registered[v as usize]);
+            let sides = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
+            if sides > 0.0 {
+                // 4 sqrt(3) area / sum of squared sides.
+                2.0 * 3f64.sqrt() * (b - a).cross(&(c - a)).norm() / sides
+            } else {
+                0.0
+            }
+        })
+        .collect();
     qualities.sort_by(f64::total_cmp);
     let at = |share: f64| {
         let k = (qualities.len() as f64 * share) as usize;
@@ -197,7 +187,31 @@ pub(super) fn measure(
         template_to_face: DistanceStatistics::from_distances(forth),
         face_to_template: DistanceStatistics::from_distances(back),
         coverage: if total > 0.0 { covered / total } else { 0.0 },
-        folded_triangles,
+        folded_triangles: folded_triangles(model, registered).len(),
         triangle_quality: [at(0.0), at(0.05), at(0.5)],
     })
+}
+
+fn is_face_triangle(model: &FaceModel<'_>, t: &[u32; 3]) -> bool {
+    t.iter().all(|&v| model.roles[v as usize] == Role::Face)
+}
+
+/// Triangles of the face that are turned against the normals around them, and are not so on
+/// the template itself.
+pub(super) fn folded_triangles(model: &FaceModel<'_>, positions: &[Point]) -> Vec<u32> {
+    let normals = vertex_normals(positions, &model.triangles);
+    let own = triangle_normals(positions, &model.triangles);
+    let own_before = triangle_normals(model.positions(), &model.triangles);
+    (0..model.triangles.len() as u32)
+        .filter(|&k| {
+            let t = &model.triangles[k as usize];
+            let turn = |normals: &[Vector], own: &[Vector]| {
+                let around: Vector = t.iter().map(|&v| normals[v as usize]).sum();
+                own[k as usize].dot(&around)
+            };
+            is_face_triangle(model, t)
+                && turn(&normals, &own) < 0.0
+                && turn(&model.normals, &own_before) > 0.0
+        })
+        .collect()
 }
