@@ -3,6 +3,7 @@
 
 use super::RegistrationError;
 use super::closest_grid::Sample;
+use super::openings::{Parting, find_partings};
 use crate::mesh::{Surface, Topology, triangle_normals, vertex_normals};
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
@@ -64,6 +65,8 @@ pub(super) struct FaceModel<'a> {
     pub(super) normals: Vec<Vector>,
     pub(super) surface: Surface,
     pub(super) openings: Vec<Opening>,
+    /// Where one sees them part on the template itself.
+    pub(super) partings: Vec<Parting>,
     triangle_roles: Vec<Role>,
     unit_triangle_normals: Vec<Vector>,
 }
@@ -99,14 +102,16 @@ impl<'a> FaceModel<'a> {
                     .unwrap_or(Role::Hidden)
             })
             .collect();
-        let openings = OpeningKind::ALL
+        let openings: Vec<Opening> = OpeningKind::ALL
             .into_iter()
             .filter_map(|kind| opening(template, &topology, kind))
             .collect();
+        let surface = Surface::new(positions, &triangles)?;
         Ok(Self {
             template,
             normals: vertex_normals(positions, &triangles),
-            surface: Surface::new(positions, &triangles)?,
+            partings: find_partings(&openings, &surface, positions),
+            surface,
             unit_triangle_normals: triangle_normals(positions, &triangles)
                 .into_iter()
                 .map(|n| n.try_normalize(0.0).unwrap_or_else(Vector::zeros))

@@ -23,12 +23,34 @@ use super::target::{Target, geman_mcclure, median_and_deviation};
 use crate::mesh::vertex_normals;
 use crate::{Point, Vector};
 
-/// A template vertex that should come to a place, whatever the closest point says.
+/// A place on the template that should come to another, whatever the closest point says.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pin {
-    pub(super) vertex: u32,
+    /// Template vertices and barycentric weights.
+    pub(super) corners: [(u32, f64); 3],
     pub(super) place: Point,
     pub(super) weight: f64,
+}
+
+impl Pin {
+    /// Of one vertex.
+    pub(super) fn of_vertex(vertex: u32, place: Point, weight: f64) -> Self {
+        Self {
+            corners: [(vertex, 1.0), (vertex, 0.0), (vertex, 0.0)],
+            place,
+            weight,
+        }
+    }
+
+    /// Where the pinned place is at these template positions.
+    pub(super) fn now(&self, vertices: &[Point]) -> Point {
+        let sum: Vector = self
+            .corners
+            .iter()
+            .map(|&(v, share)| vertices[v as usize].coords * share)
+            .sum();
+        Point::from(sum)
+    }
 }
 
 /// Stiffness of each stage, and the largest angle between normals. [degrees]
@@ -97,11 +119,13 @@ pub(super) fn deform_coarse(
                 attract(node, weight, &place);
             }
             for pin in pins(&vertices, round == 0) {
-                // A pin moves the nodes around its vertex by as much as the vertex lacks.
-                let lack = pin.place - vertices[pin.vertex as usize];
-                for &(node, share) in &graph.blends[pin.vertex as usize] {
-                    let at = vertices[graph.nodes[node as usize] as usize] + lack;
-                    attract(node, pin.weight * share, &at);
+                // A pin moves the nodes around it by as much as it lacks.
+                let lack = pin.place - pin.now(&vertices);
+                for (vertex, corner_share) in pin.corners {
+                    for &(node, share) in &graph.blends[vertex as usize] {
+                        let at = vertices[graph.nodes[node as usize] as usize] + lack;
+                        attract(node, pin.weight * corner_share * share, &at);
+                    }
                 }
             }
             for k in 0..node_count as u32 {

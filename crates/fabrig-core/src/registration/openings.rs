@@ -5,6 +5,9 @@
 //! a step (the upper lip overhangs the lower one) or a valley (a crease of a closed surface).
 //! The path of most evidence across the columns is found by dynamic programming. This works
 //! alike for holes of the mesh, for mouths and sockets with an inside, and for fused scans.
+//!
+//! The template is probed in the same way once, so that what is matched is the same thing on
+//! both: the places where one sees lips and lids part.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,7 +16,7 @@ use super::face_model::{FaceModel, Opening, OpeningKind};
 use super::nonrigid_icp::Pin;
 use super::report::OpeningState;
 use super::target::Target;
-use crate::mesh::Topology;
+use crate::mesh::{Surface, Topology};
 use crate::{Point, Vector};
 
 /// Columns from corner to corner.
@@ -32,27 +35,49 @@ const VALLEY_ROWS: usize = 6;
 /// Evidence below this is noise. [mm]
 const MIN_EVIDENCE: f64 = 0.12;
 
-/// The parting of an opening of the face.
+/// The parting of an opening.
 #[derive(Debug, Clone)]
-pub(super) struct FaceOpening {
+pub(super) struct Parting {
     pub(super) kind: OpeningKind,
-    pub(super) state: OpeningState,
-    pub(super) columns: Vec<FoundColumn>,
+    pub(super) columns: Vec<PartingColumn>,
+    /// Whether one looks inside in most of the columns.
+    is_through: bool,
+    /// From corner to corner. [mm]
+    width: f64,
+    up: Vector,
 }
 
-/// Fraction from the right corner (-X) to the left one, upper place, lower place, trust.
-type FoundColumn = (f64, Point, Point, f64);
+/// Where lips or lids part at one place between the corners.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PartingColumn {
+    /// From the right corner (-X), 0, to the left one, 1.
+    fraction: f64,
+    upper: Hit,
+    lower: Hit,
+    /// From 0 to 1.
+    trust: f64,
+}
 
-/// Finds the partings of all openings, given the template deformed so far.
-pub(super) fn find_openings(
-    model: &FaceModel<'_>,
-    target: &Target,
+/// Where a ray meets a surface.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    /// Along the view, towards the viewer. [mm]
+    depth: f64,
+    point: Point,
+    triangle: u32,
+    barycentric: [f64; 3],
+}
+
+/// Finds the partings of `openings` on a surface; `vertices` are the template's, as far as it
+/// has been deformed.
+pub(super) fn find_partings(
+    openings: &[Opening],
+    surface: &Surface,
     vertices: &[Point],
-) -> Vec<FaceOpening> {
-    model
-        .openings
+) -> Vec<Parting> {
+    openings
         .iter()
-        .filter_map(|opening| trace(opening, target, vertices))
+        .filter_map(|opening| trace(opening, surface, vertices))
         .collect()
 }
 
@@ -60,14 +85,14 @@ pub(super) fn find_openings(
 /// nothing is met.
 struct Column {
     fraction: f64,
-    hits: Vec<Option<(f64, Point)>>,
+    hits: Vec<Option<Hit>>,
     evidence: Vec<f64>,
     is_gap: Vec<bool>,
     /// Gaps so deep that one looks inside.
     is_through: Vec<bool>,
 }
 
-fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceOpening> {
+fn trace(opening: &Opening, surface: &Surface, vertices: &[Point]) -> Option<Parting> {
     let line =
         |side: &[u32]| -> Vec<Point> { side.iter().map(|&v| vertices[v as usize]).collect() };
     let (upper, lower) = (line(&opening.upper), line(&opening.lower));
@@ -86,44 +111,58 @@ fn trace(opening: &Opening, target: &Target, vertices: &[Point]) -> Option<FaceO
                 &at_fraction(&upper, fraction),
                 &at_fraction(&lower, fraction),
             );
-            probe(target, fraction, &middle, &up, &view)
+            probe(surface, fraction, &middle, &up, &view)
         })
         .collect();
     for c in &mut columns {
         weigh(c);
     }
     let path = best_path(&columns);
-    let found: Vec<FoundColumn> = columns
+    let found: Vec<PartingColumn> = columns
         .iter()
         .zip(&path)
         .filter_map(|(c, &row)| {
-            let trust = c.evidence[row];
-            let (up_place, low_place) = edges(c, row)?;
-            (trust > MIN_EVIDENCE).then_some((c.fraction, up_place, low_place, trust.min(1.0)))
+            let (upper, lower) = edges(c, row)?;
+            (c.evidence[row] > MIN_EVIDENCE).then_some(PartingColumn {
+                fraction: c.fraction,
+                upper,
+                lower,
+                trust: c.evidence[row].min(1.0),
+            })
         })
         .collect();
     if found.len() < COLUMN_COUNT / 4 {
         return None;
     }
-    let state = state_of(target, &columns, &path, &found, &up, (left - right).norm());
-    Some(FaceOpening {
+    let through_count = columns
+        .iter()
+        .zip(&path)
+        .filter(|(c, row)| c.is_through[**row])
+        .count();
+    Some(Parting {
         kind: opening.kind,
-        state,
         columns: found,
+        is_through: 2 * through_count > columns.len(),
+        width: (left - right).norm(),
+        up,
     })
 }
 
-fn probe(target: &Target, fraction: f64, middle: &Point, up: &Vector, view: &Vector) -> Column {
+fn probe(surface: &Surface, fraction: f64, middle: &Point, up: &Vector, view: &Vector) -> Column {
     const BEFORE_MM: f64 = 25.0;
     const BEHIND_MM: f64 = 20.0;
     let hits = (0..ROW_COUNT)
         .map(|row| {
             let height = row as f64 * STEP_MM - HALF_HEIGHT_MM;
             let origin = middle + up * height + view * BEFORE_MM;
-            target
-                .surface
+            surface
                 .cast_ray(&origin, &-view, BEFORE_MM + BEHIND_MM)
-                .map(|hit| (BEFORE_MM - hit.distance, origin - view * hit.distance))
+                .map(|hit| Hit {
+                    depth: BEFORE_MM - hit.distance,
+                    point: origin - view * hit.distance,
+                    triangle: hit.triangle,
+                    barycentric: hit.barycentric.map(|b| b.clamp(0.0, 1.0)),
+                })
         })
         .collect();
     Column {
@@ -141,7 +180,7 @@ fn probe(target: &Target, fraction: f64, middle: &Point, up: &Vector, view: &Vec
 /// A gap is a run of rows between a drop and a rise, seen from below, that lies deeper than
 /// the skin at both its ends; a crease slopes down without a drop.
 fn weigh(column: &mut Column) {
-    let depth = |row: usize| column.hits[row].map_or(-1e3, |h| h.0);
+    let depth = |row: usize| column.hits[row].map_or(-1e3, |h| h.depth);
     let mut behind = vec![0.0; ROW_COUNT];
     let mut start = None;
     for row in 0..ROW_COUNT - 1 {
@@ -215,8 +254,8 @@ fn best_path(columns: &[Column]) -> Vec<usize> {
 
 /// Upper and lower place of a parting at `row`: the ends of the gap, the two sides of the
 /// step, or the same place twice.
-fn edges(column: &Column, row: usize) -> Option<(Point, Point)> {
-    let place = |r: usize| column.hits.get(r).copied().flatten().map(|h| h.1);
+fn edges(column: &Column, row: usize) -> Option<(Hit, Hit)> {
+    let place = |r: usize| column.hits.get(r).copied().flatten();
     if column.is_gap[row] {
         let up = (row..ROW_COUNT).find(|&r| !column.is_gap[r])?;
         let down = (0..row).rev().find(|&r| !column.is_gap[r])?;
@@ -225,41 +264,40 @@ fn edges(column: &Column, row: usize) -> Option<(Point, Point)> {
     let here = place(row)?;
     let next = place(row + 1)?;
     let is_step = match (column.hits[row], column.hits[row + 1]) {
-        (Some(a), Some(b)) => (a.0 - b.0).abs() > JUMP_MM,
+        (Some(a), Some(b)) => (a.depth - b.depth).abs() > JUMP_MM,
         _ => true,
     };
     Some(if is_step { (next, here) } else { (here, here) })
 }
 
-/// Open where a gap is seen between the sides, or where the way from side to side along the
-/// surface is nearly as long as the way round a corner; closed and fused otherwise.
-fn state_of(
-    target: &Target,
-    columns: &[Column],
-    path: &[usize],
-    found: &[FoundColumn],
-    up: &Vector,
-    width: f64,
-) -> OpeningState {
+/// Open where one looks inside, or where the way from side to side along the surface is nearly
+/// as long as the way round a corner; closed and fused otherwise.
+pub(super) fn state_of(target: &Target, parting: &Parting) -> OpeningState {
     const BESIDE_MM: f64 = 2.0;
-    let through_count = columns
-        .iter()
-        .zip(path)
-        .filter(|(c, row)| c.is_through[**row])
-        .count();
-    if 2 * through_count > columns.len() {
+    if parting.is_through {
         return OpeningState::Open;
     }
     let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
-    let middle: Vec<_> = found.iter().filter(|c| (c.0 - 0.5).abs() < 0.13).collect();
+    let beside = parting.up * BESIDE_MM;
+    let middle: Vec<_> = parting
+        .columns
+        .iter()
+        .filter(|c| (c.fraction - 0.5).abs() < 0.13)
+        .collect();
     let open_count = middle
         .iter()
         .filter(|column| {
-            let above = nearest_vertex(target, &(column.1 + up * BESIDE_MM));
-            let below = nearest_vertex(target, &(column.2 - up * BESIDE_MM));
+            let above = nearest_vertex(target, &(column.upper.point + beside));
+            let below = nearest_vertex(target, &(column.lower.point - beside));
             let direct =
                 (target.positions[above as usize] - target.positions[below as usize]).norm();
-            !is_within(target, &topology, above, below, direct + 0.55 * width)
+            !is_within(
+                target,
+                &topology,
+                above,
+                below,
+                direct + 0.55 * parting.width,
+            )
         })
         .count();
     if 2 * open_count > middle.len() {
@@ -301,51 +339,29 @@ fn is_within(target: &Target, topology: &Topology, from: u32, to: u32, limit: f6
     false
 }
 
-/// Pins of the template's contact lines to the partings of the face, at equal fractions of
-/// their lengths from corner to corner.
-pub(super) fn opening_pins(
-    model: &FaceModel<'_>,
-    found: &[FaceOpening],
-    vertices: &[Point],
-    weight: f64,
-) -> Vec<Pin> {
+/// Pins of the template's partings to those of the face, at equal fractions from corner to
+/// corner.
+pub(super) fn parting_pins(model: &FaceModel<'_>, found: &[Parting], weight: f64) -> Vec<Pin> {
     let mut pins = Vec::new();
     for face in found {
-        let Some(opening) = model.openings.iter().find(|o| o.kind == face.kind) else {
+        let Some(own) = model.partings.iter().find(|o| o.kind == face.kind) else {
             continue;
         };
-        for (line, is_upper) in [(&opening.upper, true), (&opening.lower, false)] {
-            let own: Vec<Point> = line.iter().map(|&v| vertices[v as usize]).collect();
-            let total = length_of(&own);
-            let mut walked = 0.0;
-            for (k, &vertex) in line.iter().enumerate() {
-                if k > 0 {
-                    walked += (own[k] - own[k - 1]).norm();
-                }
-                let fraction = if total > 0.0 { walked / total } else { 0.0 };
-                if let Some((place, trust)) = place_at(face, fraction, is_upper) {
-                    pins.push(Pin {
-                        vertex,
-                        place,
-                        weight: weight * trust,
-                    });
-                }
+        for column in &own.columns {
+            let Some(mate) = face.columns.iter().find(|c| c.fraction == column.fraction) else {
+                continue;
+            };
+            for (from, to) in [(&column.upper, &mate.upper), (&column.lower, &mate.lower)] {
+                let corners = model.triangles[from.triangle as usize];
+                pins.push(Pin {
+                    corners: [0, 1, 2].map(|k| (corners[k], from.barycentric[k])),
+                    place: to.point,
+                    weight: weight * column.trust * mate.trust,
+                });
             }
         }
     }
     pins
-}
-
-/// Place of one side between the columns around a fraction; `None` where columns are missing.
-fn place_at(face: &FaceOpening, fraction: f64, is_upper: bool) -> Option<(Point, f64)> {
-    let k = face.columns.partition_point(|c| c.0 < fraction);
-    let (a, b) = (face.columns.get(k.checked_sub(1)?)?, face.columns.get(k)?);
-    if b.0 - a.0 > 3.0 / (COLUMN_COUNT - 1) as f64 {
-        return None;
-    }
-    let t = (fraction - a.0) / (b.0 - a.0);
-    let (p, q) = if is_upper { (a.1, b.1) } else { (a.2, b.2) };
-    Some((p + (q - p) * t, a.3 + (b.3 - a.3) * t))
 }
 
 fn length_of(line: &[Point]) -> f64 {
@@ -376,7 +392,12 @@ mod tests {
             hits: (0..ROW_COUNT)
                 .map(|r| {
                     let y = r as f64 * STEP_MM - HALF_HEIGHT_MM;
-                    depth(y).map(|z| (z, Point::new(0.0, y, z)))
+                    depth(y).map(|z| Hit {
+                        depth: z,
+                        point: Point::new(0.0, y, z),
+                        triangle: 0,
+                        barycentric: [1.0, 0.0, 0.0],
+                    })
                 })
                 .collect(),
             evidence: Vec::new(),
@@ -389,7 +410,8 @@ mod tests {
 
     fn parting(c: Column) -> (Point, Point) {
         let row = best_path(std::slice::from_ref(&c))[0];
-        edges(&c, row).expect("a parting")
+        let (upper, lower) = edges(&c, row).expect("a parting");
+        (upper.point, lower.point)
     }
 
     #[test]

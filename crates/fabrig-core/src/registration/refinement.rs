@@ -48,7 +48,7 @@ pub(super) fn refine(
     model: &FaceModel<'_>,
     target: &Target,
     start: &[Point],
-    pins: &dyn Fn(&[Point]) -> Vec<Pin>,
+    pins: &[Pin],
     mut on_round: impl FnMut(f64) -> Result<(), RegistrationError>,
 ) -> Result<Vec<Point>, RegistrationError> {
     let count = start.len();
@@ -97,13 +97,19 @@ pub(super) fn refine(
                 }
             }
         }
-        for pin in pins(&vertices) {
-            let v = pin.vertex;
+        for pin in pins {
             let weight = pin.weight * energy.pin_area;
-            system.add(v, v, weight);
-            let d = pin.place - start[v as usize];
-            for c in 0..3 {
-                rhs[c * count + v as usize] += weight * d[c];
+            let d = pin.place - pin.now(start);
+            for (k, &(a, share)) in pin.corners.iter().enumerate() {
+                for &(b, other) in &pin.corners[..=k] {
+                    // A vertex pinned alone repeats itself with shares of zero.
+                    if share != 0.0 && other != 0.0 {
+                        system.add(a, b, weight * share * other);
+                    }
+                }
+                for c in 0..3 {
+                    rhs[c * count + a as usize] += weight * share * d[c];
+                }
             }
         }
         for v in 0..count as u32 {

@@ -13,7 +13,7 @@ use super::face_model::{FaceModel, OpeningKind, Role};
 use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
-use super::openings::{FaceOpening, find_openings, opening_pins};
+use super::openings::{Parting, find_partings, parting_pins, state_of};
 use super::parts::{RigidComponent, eye_centers, recognise};
 use super::refinement::refine;
 use super::report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure};
@@ -127,7 +127,7 @@ pub fn register(
     let target = target_of(&cleaned, start.piece, &start.to_head)?;
     let graph = NodeGraph::new(model.positions(), &model.topology, 1);
     let pins = Pins::new(&landmarks, &start.to_head);
-    let mut openings: Vec<FaceOpening> = Vec::new();
+    let mut partings: Vec<Parting> = Vec::new();
     let coarse = deform_coarse(
         &model,
         &graph,
@@ -135,21 +135,21 @@ pub fn register(
         model.positions(),
         &mut |vertices, is_first_of_stage| {
             if is_first_of_stage {
-                openings = find_openings(&model, &target, vertices);
+                partings = find_partings(&model.openings, &target.surface, vertices);
             }
-            pins.at(&model, &openings, vertices, 1.0)
+            pins.at(&model, &partings, 1.0)
         },
         |share| clock.step("deform", 0.35 + 0.3 * share),
     )?;
     clock.finish("deform");
 
     clock.step("refine", 0.65)?;
-    let openings = find_openings(&model, &target, &coarse);
+    let partings = find_partings(&model.openings, &target.surface, &coarse);
     let mut refined = refine(
         &model,
         &target,
         &coarse,
-        &|vertices| pins.at(&model, &openings, vertices, 10.0),
+        &pins.at(&model, &partings, 10.0),
         |share| clock.step("refine", 0.65 + 0.25 * share),
     )?;
     unfold(&model, &mut refined)?;
@@ -185,13 +185,13 @@ pub fn register(
     let rigid_components = recognise(&model, &cleaned, start.piece, &clean_positions, &positions);
     clock.finish("map");
 
-    let target = target_of(&cleaned, start.piece, &to_head)?;
-    let measures = measure(&model, &target, &positions)?;
+    let measured = target_of(&cleaned, start.piece, &to_head)?;
+    let measures = measure(&model, &measured, &positions)?;
     let state = |kind: OpeningKind| {
-        openings
+        partings
             .iter()
-            .find(|o| o.kind == kind)
-            .map_or(OpeningState::Fused, |o| o.state)
+            .find(|p| p.kind == kind)
+            .map_or(OpeningState::Fused, |p| state_of(&target, p))
     };
     let landmark_distances = (!landmarks.names.is_empty()).then(|| {
         DistanceStatistics::from_distances(
@@ -439,23 +439,13 @@ impl Pins {
         }
     }
 
-    fn at(
-        &self,
-        model: &FaceModel<'_>,
-        openings: &[FaceOpening],
-        vertices: &[Point],
-        weight: f64,
-    ) -> Vec<Pin> {
+    fn at(&self, model: &FaceModel<'_>, partings: &[Parting], weight: f64) -> Vec<Pin> {
         let mut pins: Vec<Pin> = self
             .landmarks
             .iter()
-            .map(|&(vertex, place)| Pin {
-                vertex,
-                place,
-                weight: 4.0 * weight,
-            })
+            .map(|&(vertex, place)| Pin::of_vertex(vertex, place, 4.0 * weight))
             .collect();
-        pins.extend(opening_pins(model, openings, vertices, weight));
+        pins.extend(parting_pins(model, partings, weight));
         pins
     }
 }
