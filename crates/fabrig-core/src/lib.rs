@@ -25,6 +25,7 @@ mod error;
 pub mod facs;
 pub mod mesh;
 pub mod motion;
+pub mod pipeline;
 pub mod recording;
 pub mod registration;
 #[cfg(feature = "render")]

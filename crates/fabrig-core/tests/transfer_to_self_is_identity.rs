@@ -1,5 +1,5 @@
 //! The template rigged as a user's face gives back its own whole-face shapes: muscle shapes,
-//! patches and skin weights lose little on the way. `examples/chain_loss.rs` prints the table.
+//! patches and skin weights lose little on the way. `fabrig bench chain` prints the table.
 
 mod faces;
 

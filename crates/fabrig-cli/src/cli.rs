@@ -1,0 +1,277 @@
+//! The command line as types.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use fabrig_core::recording::RecordingOptions;
+
+/// Rigs any 3D face, animates it from performance capture, records it to MCAP.
+#[derive(Debug, Parser)]
+#[command(name = "fabrig", version, about, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Make a rig from a neutral face mesh
+    Rig(RigArgs),
+    /// Drive a rig by a take and record it
+    Animate(AnimateArgs),
+    /// Rig and animate the bundled face with the bundled take
+    Demo(DemoArgs),
+    /// Draw a mesh, a rig or a recording to PNG or GIF
+    Render(RenderArgs),
+    /// Say what is in a mesh, a rig, a take or a recording
+    Info(InfoArgs),
+    /// Build or check a template pack
+    #[command(subcommand)]
+    Template(TemplateCommand),
+    /// Measure
+    #[command(subcommand)]
+    Bench(BenchCommand),
+}
+
+/// Length of one unit of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Unit {
+    /// Millimetres
+    Mm,
+    /// Centimetres
+    Cm,
+    /// Metres
+    M,
+    /// Inches
+    In,
+}
+
+impl Unit {
+    /// Its length. [mm]
+    pub(crate) fn millimetres(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Cm => 10.0,
+            Self::M => 1000.0,
+            Self::In => 25.4,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RigArgs {
+    /// Neutral face or head: OBJ, PLY, STL or glTF
+    pub(crate) face: PathBuf,
+    /// Where to write the rig
+    #[arg(short, long, value_name = "FACE.fabrig")]
+    pub(crate) output: PathBuf,
+    /// JSON of landmark name to [x, y, z] in the mesh's own units
+    #[arg(long, value_name = "JSON")]
+    pub(crate) landmarks: Option<PathBuf>,
+    /// Unit of the mesh; without it the face is scaled by the distance of its eyes
+    #[arg(long, value_enum)]
+    pub(crate) unit: Option<Unit>,
+    /// Also write the face in the template's topology, in millimetres
+    #[arg(long, value_name = "OUT.obj")]
+    pub(crate) normalized: Option<PathBuf>,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TakeArgs {
+    /// Frames per second of a CSV that has frame numbers or no times
+    #[arg(long, value_name = "FPS")]
+    pub(crate) motion_fps: Option<f64>,
+    /// Pass over columns of the take that are not known
+    #[arg(long)]
+    pub(crate) ignore_unknown_columns: bool,
+    /// Clamp weights of the take that are outside [0, 1]
+    #[arg(long)]
+    pub(crate) clamp_weights: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// Frames per second of the simulation [default: the take's]
+    #[arg(long)]
+    pub(crate) fps: Option<f64>,
+    /// Substeps of the cloth per 1/60 s [default: the solver's]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) substeps: Option<u32>,
+    /// Gravity in mm/s^2, world axes, +Y up [default: 0,-9810,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    pub(crate) gravity: Option<[f32; 3]>,
+    /// Wind in mm/s, world axes, added to the take's own
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    pub(crate) wind: Option<[f32; 3]>,
+    /// Leave the cloth out: patches stand where the muscle shapes want them
+    #[arg(long)]
+    pub(crate) without_dynamics: bool,
+    /// Skin meshes per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().skin_hz, value_parser = parse_rate)]
+    pub(crate) skin_hz: f64,
+    /// Patch meshes per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().patches_hz, value_parser = parse_rate)]
+    pub(crate) patches_hz: f64,
+    /// Point clouds per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().points_hz, value_parser = parse_rate)]
+    pub(crate) points_hz: f64,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl SceneArgs {
+    /// How often what is written.
+    pub(crate) fn recording(&self) -> RecordingOptions {
+        RecordingOptions {
+            skin_hz: self.skin_hz,
+            patches_hz: self.patches_hz,
+            points_hz: self.points_hz,
+            ..RecordingOptions::default()
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct AnimateArgs {
+    /// Rig, as `fabrig rig` makes it
+    pub(crate) rig: PathBuf,
+    /// Live Link Face or ARKit CSV, or keyed text
+    #[arg(long, value_name = "TAKE")]
+    pub(crate) motion: PathBuf,
+    /// Where to write the recording
+    #[arg(short, long, value_name = "OUT.mcap")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) take: TakeArgs,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Where to write the recording
+    #[arg(short, long, value_name = "OUT.mcap", default_value = "demo.mcap")]
+    pub(crate) output: PathBuf,
+    /// Also keep the rig
+    #[arg(long, value_name = "FACE.fabrig")]
+    pub(crate) rig: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// Mesh, rig (.fabrig) or recording (.mcap); `demo` and `template` are the bundled ones
+    pub(crate) input: PathBuf,
+    /// PNG, or GIF for a recording
+    #[arg(short, long, value_name = "OUT.png")]
+    pub(crate) output: PathBuf,
+    /// Views side by side: front, three-quarter, side, back, top, below or YAW,PITCH in degrees
+    #[arg(long, value_name = "VIEW", default_value = "front", num_args = 1..)]
+    pub(crate) view: Vec<String>,
+    /// Size of each picture in pixels
+    #[arg(long, default_value_t = 640, value_parser = clap::value_parser!(u32).range(16..=8192))]
+    pub(crate) size: u32,
+    /// Show muscles and fat instead of the skin
+    #[arg(long)]
+    pub(crate) patches: bool,
+    /// Write the name of each patch beside it
+    #[arg(long, requires = "patches")]
+    pub(crate) names: bool,
+    /// Show polygon edges
+    #[arg(long)]
+    pub(crate) edges: bool,
+    /// Pose of a rig, held until still: SHAPE=WEIGHT,...; each one is a row
+    #[arg(long, value_name = "POSE", conflicts_with = "expressions")]
+    pub(crate) pose: Vec<String>,
+    /// A sheet of ten expressions of a rig
+    #[arg(long)]
+    pub(crate) expressions: bool,
+    /// Time of the frame of a recording, in seconds
+    #[arg(long, value_name = "SECS")]
+    pub(crate) time: Option<f64>,
+    /// Frames per second of a GIF
+    #[arg(long, default_value_t = 15.0)]
+    pub(crate) fps: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// Mesh, rig, take or recording
+    pub(crate) file: PathBuf,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum TemplateCommand {
+    /// Build `geometry.bin` of a pack from its source data
+    Build {
+        /// The `data` folder of the source
+        data: PathBuf,
+        /// The pack, with its `template.toml`
+        #[arg(default_value = "templates/human")]
+        folder: PathBuf,
+    },
+    /// Load a pack with everything that is read from it
+    Check {
+        /// The pack; the bundled one without it
+        folder: Option<PathBuf>,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// What the whole chain loses: the template rigged as a user's face, shape by shape
+    Chain {
+        /// Let the cloth settle on each shape instead of placing the patches
+        #[arg(long)]
+        cloth: bool,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate >= 0.0 => Ok(rate),
+        _ => Err("expected a number of times per second, at least 0".to_owned()),
+    }
+}
+
+fn parse_vector(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f32>())
+        .collect::<Result<_, _>>()
+        .map_err(|_| "expected three numbers X,Y,Z".to_owned())?;
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok([x, y, z]),
+        _ => Err("expected three finite numbers X,Y,Z".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn vectors_are_three_finite_numbers() {
+        assert_eq!(parse_vector("1,-2.5, 3"), Ok([1.0, -2.5, 3.0]));
+        for bad in ["", "1,2", "1,2,3,4", "1,x,3", "1,nan,3"] {
+            assert!(parse_vector(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! `fabrig animate`: a rig and a take become a recording.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use fabrig_core::motion::{self, Clip, ReadOptions};
+use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
+use fabrig_core::rig::Rig;
+use fabrig_core::scene::{Dynamics, Scene};
+
+use super::viewers::{print_how_to_open, write_viewer_files};
+use super::{Outcome, check_output, stem};
+use crate::cli::{AnimateArgs, SceneArgs, TakeArgs};
+use crate::console::Console;
+
+pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
+    check_output(&args.output)?;
+    let rig = load_rig(&args.rig)?;
+    let clip = motion::read(&args.motion, &read_options(&args.take))?;
+    let options = AnimateOptions {
+        fps: args.scene.fps,
+        rig_name: stem(&args.rig),
+        take_name: stem(&args.motion),
+        recording: args.scene.recording(),
+    };
+    let report = record(console, rig, clip, &args.scene, &args.output, &options)?;
+    if args.scene.json {
+        console.result(&serde_json::to_string_pretty(&report)?);
+    } else {
+        print_report(console, &report);
+        print_how_to_open(console, &args.output);
+    }
+    Ok(outcome(console, &report))
+}
+
+pub(super) fn load_rig(path: &Path) -> Result<Rig> {
+    Rig::load(path).with_context(|| format!("{} cannot be used", path.display()))
+}
+
+pub(super) fn read_options(args: &TakeArgs) -> ReadOptions {
+    ReadOptions {
+        frame_rate: args.motion_fps,
+        ignore_unknown_columns: args.ignore_unknown_columns,
+        clamp_weights: args.clamp_weights,
+        ..ReadOptions::default()
+    }
+}
+
+/// Simulates and records with a progress bar, and writes the viewers' files beside it.
+pub(super) fn record(
+    console: &Console,
+    rig: Rig,
+    clip: Clip,
+    args: &SceneArgs,
+    output: &Path,
+    options: &AnimateOptions,
+) -> Result<AnimateReport> {
+    let report = animate(
+        Arc::new(rig),
+        clip,
+        scene(args),
+        output,
+        options,
+        &mut |now| {
+            let detail = format!("{}/{} frames", now.frame, now.frame_count);
+            console.show("simulate", now.frame, now.frame_count, &detail)
+        },
+    );
+    console.clear();
+    let report = report?;
+    write_viewer_files(output, &report.foxglove_layout)?;
+    Ok(report)
+}
+
+fn scene(args: &SceneArgs) -> Scene {
+    let mut scene = Scene::default();
+    if args.without_dynamics {
+        scene.dynamics = Dynamics::None;
+    }
+    if let Some(substeps) = args.substeps {
+        scene.cloth.substeps = substeps;
+    }
+    if let Some(gravity) = args.gravity {
+        scene.gravity = gravity.into();
+    }
+    if let Some(wind) = args.wind {
+        scene.wind = wind.into();
+    }
+    scene
+}
+
+pub(super) fn outcome(console: &Console, report: &AnimateReport) -> Outcome {
+    if report.is_complete {
+        return Outcome::Done;
+    }
+    console.note(&format!(
+        "stopped after {} frames; the recording is whole up to there",
+        report.frames
+    ));
+    Outcome::Partial
+}
+
+/// What the animation took and did, for people.
+pub(super) fn print_report(console: &Console, report: &AnimateReport) {
+    let line = |name: &str, value: String| console.result(&format!("{name:<20}{value}"));
+    let times = |t: &TimeStatistics| {
+        format!(
+            "median {:.2}  95% {:.2}  99% {:.2}  max {:.2} ms/frame",
+            t.median, t.p95, t.p99, t.max
+        )
+    };
+    let take = &report.take;
+    for (count, what) in [
+        (take.clamped_weights, "weights just outside [0, 1] clamped"),
+        (take.duplicate_rows, "rows at a repeated time replaced"),
+        (
+            take.dropped_frames,
+            "frames missing from the capture bridged",
+        ),
+        (take.ignored_columns.len(), "unknown columns passed over"),
+    ] {
+        if count > 0 {
+            line("take", format!("{count} {what}"));
+        }
+    }
+    line(
+        "frames",
+        format!(
+            "{} at {:.3} a second, {:.2} s, {} skin vertices, {} nodes",
+            report.frames,
+            report.fps,
+            report.recording.duration_secs,
+            report.vertex_count,
+            report.node_count
+        ),
+    );
+    line("simulation", times(&report.simulation_ms));
+    line("of which cloth", times(&report.cloth_ms));
+    line("recording", times(&report.recording_ms));
+    line(
+        "guards",
+        format!(
+            "{} displacements clamped, {} fallbacks to backward Euler, {} patches put back",
+            report.guards.clamped_displacements,
+            report.guards.euler_fallbacks,
+            report.guards.frozen_patches
+        ),
+    );
+    line(
+        "from muscle shapes",
+        format!("at most {:.2} mm rms in a frame", report.settle_rms_max),
+    );
+    line(
+        "file",
+        format!("{:.1} MB", report.recording.bytes as f64 / 1e6),
+    );
+    line("time", format!("{:.2} s", report.wall_secs));
+}

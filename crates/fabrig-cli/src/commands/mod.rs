@@ -1,0 +1,66 @@
+//! One file per verb.
+
+mod animate;
+mod bench;
+mod demo;
+mod info;
+mod pose;
+mod render;
+mod rig;
+mod template;
+mod viewers;
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+
+use crate::cli::Command;
+use crate::console::Console;
+
+/// How a command that did not fail ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All that was asked for.
+    Done,
+    /// Less than that, and said so: what is there is whole.
+    Partial,
+}
+
+/// Runs a command.
+pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
+    match command {
+        Command::Rig(args) => rig::run(console, &args),
+        Command::Animate(args) => animate::run(console, &args),
+        Command::Demo(args) => demo::run(console, &args),
+        Command::Render(args) => render::run(console, &args),
+        Command::Info(args) => info::run(console, &args),
+        Command::Template(command) => template::run(console, &command),
+        Command::Bench(command) => bench::run(console, &command),
+    }
+}
+
+/// Refuses an output before anything is computed for it.
+fn check_output(path: &Path) -> Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        bail!(
+            "cannot write {}: the folder {} does not exist",
+            path.display(),
+            folder.display()
+        );
+    }
+    if path.is_dir() {
+        bail!("cannot write {}: it is a folder", path.display());
+    }
+    Ok(())
+}
+
+/// The name of a file without folder and extension.
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}

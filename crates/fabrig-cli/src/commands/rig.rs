@@ -1,0 +1,146 @@
+//! `fabrig rig`: a mesh becomes a rig.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use fabrig_core::Point;
+use fabrig_core::mesh::Mesh;
+use fabrig_core::mesh::io::{read_mesh, write_obj};
+use fabrig_core::pipeline::{RigFaceOptions, RiggedFace, rig_face};
+use fabrig_core::registration::{DistanceStatistics, OpeningState};
+use fabrig_core::template;
+
+use super::{Outcome, check_output};
+use crate::cli::RigArgs;
+use crate::console::Console;
+
+pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
+    check_output(&args.output)?;
+    if let Some(path) = &args.normalized {
+        check_output(path)?;
+    }
+    let mut options = RigFaceOptions::default();
+    options.registration.unit_mm = args.unit.map(crate::cli::Unit::millimetres);
+    if let Some(path) = &args.landmarks {
+        options.registration.landmarks = read_landmarks(path)?;
+    }
+    let face = read_mesh(&args.face)?;
+    let rigged = rig(console, &face, &options)
+        .with_context(|| format!("{} was not rigged", args.face.display()))?;
+    rigged.rig.save(&args.output)?;
+    if let Some(path) = &args.normalized {
+        write_obj(path, &rigged.normalized)?;
+    }
+    if args.json {
+        console.result(&serde_json::to_string_pretty(&rigged.report)?);
+    } else {
+        print_report(console, &rigged);
+        console.result(&format!("{:<20}{}", "rig", args.output.display()));
+    }
+    Ok(Outcome::Done)
+}
+
+/// Rigs with the bundled template and a progress bar.
+pub(super) fn rig(console: &Console, face: &Mesh, options: &RigFaceOptions) -> Result<RiggedFace> {
+    let rigged = rig_face(face, template::human(), options, &mut |step| {
+        console.share(step.stage, step.fraction)
+    });
+    console.clear();
+    Ok(rigged?)
+}
+
+/// What registration measured, for people.
+pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
+    let report = &rigged.report;
+    let line = |name: &str, value: String| console.result(&format!("{name:<20}{value}"));
+    let distances = |d: &DistanceStatistics| {
+        format!(
+            "median {:.2}  rms {:.2}  95% {:.2}  max {:.2} mm  ({} points)",
+            d.median, d.rms, d.p95, d.max, d.count
+        )
+    };
+    let patches = &rigged.rig.patches;
+    let nodes: usize = patches.iter().map(|p| p.patch.neutral.len()).sum();
+    line(
+        "face",
+        format!(
+            "{} vertices, {} polygons, {:.4} mm per unit",
+            rigged.rig.face.vertex_count(),
+            rigged.rig.face.face_count(),
+            report.millimetres_per_unit
+        ),
+    );
+    line(
+        "alignment",
+        format!(
+            "{}, residual {:.2} mm",
+            if report.used_landmarks {
+                "by landmarks".to_owned()
+            } else {
+                format!("automatic, confidence {:.2}", report.confidence)
+            },
+            report.alignment_residual_mm
+        ),
+    );
+    line("template to face", distances(&report.template_to_face));
+    line("face to template", distances(&report.face_to_template));
+    if let Some(landmarks) = &report.landmarks {
+        line("landmarks", distances(landmarks));
+    }
+    let state = |s: OpeningState| match s {
+        OpeningState::Open => "open",
+        OpeningState::Fused => "fused",
+    };
+    line(
+        "openings",
+        format!(
+            "mouth {}, left eye {}, right eye {}",
+            state(report.mouth),
+            state(report.eyes[0]),
+            state(report.eyes[1])
+        ),
+    );
+    line(
+        "quality",
+        format!(
+            "coverage {:.1} %, {} folded triangles, triangle quality min {:.2} median {:.2}",
+            100.0 * report.coverage,
+            report.folded_triangles,
+            report.triangle_quality[0],
+            report.triangle_quality[2]
+        ),
+    );
+    line("patches", format!("{} with {nodes} nodes", patches.len()));
+    let stages: Vec<String> = report
+        .times
+        .iter()
+        .map(|t| format!("{} {:.2}", t.stage, t.seconds))
+        .collect();
+    line(
+        "time",
+        format!("{:.2} s ({})", report.total_seconds(), stages.join(", ")),
+    );
+    for warning in &report.warnings {
+        line("note", warning.clone());
+    }
+}
+
+/// Landmarks from a JSON object of name -> [x, y, z].
+fn read_landmarks(path: &Path) -> Result<BTreeMap<String, Point>> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let landmarks: BTreeMap<String, [f64; 3]> = serde_json::from_str(&text).with_context(|| {
+        format!(
+            "{} is not a JSON object of landmark name to [x, y, z]",
+            path.display()
+        )
+    })?;
+    if landmarks.is_empty() {
+        bail!("{} names no landmarks", path.display());
+    }
+    Ok(landmarks
+        .into_iter()
+        .map(|(name, position)| (name, Point::from(position)))
+        .collect())
+}

@@ -1,0 +1,398 @@
+//! From a rig and a take to a recording.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use super::TimeStatistics;
+use crate::Error;
+use crate::cloth::Counters;
+use crate::motion::{Clip, ClipNotes};
+use crate::recording::{
+    Frame, LogEvent, LogLevel, McapRecorder, RecordingInfo, RecordingOptions, RecordingReport,
+    SurfaceInfo, foxglove_layout,
+};
+use crate::rig::Rig;
+use crate::scene::{FrameReport, Scene, Simulation};
+
+/// How a take is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnimateOptions {
+    /// Frames a second of the simulation; [`recording_rate`] of the take when `None`. [1/s]
+    pub fps: Option<f64>,
+    /// Name of the rig in the recording.
+    pub rig_name: String,
+    /// Name of the take in the recording.
+    pub take_name: String,
+    /// What is written how often.
+    pub recording: RecordingOptions,
+}
+
+impl Default for AnimateOptions {
+    fn default() -> Self {
+        Self {
+            fps: None,
+            rig_name: "face".to_owned(),
+            take_name: "take".to_owned(),
+            recording: RecordingOptions::default(),
+        }
+    }
+}
+
+/// How far an animation has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AnimateProgress {
+    /// Frames recorded.
+    pub frame: u64,
+    /// Frames there will be.
+    pub frame_count: u64,
+    /// What the last frame took and did.
+    pub last: FrameReport,
+}
+
+/// What an animation took and did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AnimateReport {
+    /// Whether the take was recorded to its end, rather than stopped.
+    pub is_complete: bool,
+    /// Frames recorded.
+    pub frames: u64,
+    /// Frames a second of the simulation. [1/s]
+    pub fps: f64,
+    /// Vertices of the user's mesh.
+    pub vertex_count: usize,
+    /// Nodes of all patches.
+    pub node_count: usize,
+    /// Muscle shapes, cloth and skin of a frame. [ms]
+    pub simulation_ms: TimeStatistics,
+    /// The cloth of a frame. [ms]
+    pub cloth_ms: TimeStatistics,
+    /// Writing a frame. [ms]
+    pub recording_ms: TimeStatistics,
+    /// Everything, by the clock on the wall. [s]
+    pub wall_secs: f64,
+    /// Guards of the solver that acted.
+    pub guards: Counters,
+    /// Largest root mean square distance of a frame's nodes from their muscle shapes. [mm]
+    pub settle_rms_max: f64,
+    /// What reading the take had to decide.
+    pub take: ClipNotes,
+    /// What the recording holds.
+    pub recording: RecordingReport,
+    /// Layout for Foxglove and Lichtblick, as the recording has it attached.
+    #[serde(skip)]
+    pub foxglove_layout: String,
+}
+
+/// Frame rates that a take's own rate is taken for when it is this near: timecodes are rounded.
+const STANDARD_RATES: [f64; 7] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0];
+const RATE_TOLERANCE: f64 = 0.005;
+const DEFAULT_RATE: f64 = 60.0;
+
+/// The rate at which a take is simulated unless another is asked for: its own.
+pub fn recording_rate(clip: &Clip) -> f64 {
+    let Some(own) = clip.frame_rate() else {
+        return DEFAULT_RATE;
+    };
+    let near = |rate: &f64| (own / rate - 1.0).abs() <= RATE_TOLERANCE;
+    STANDARD_RATES.into_iter().find(near).unwrap_or(own)
+}
+
+/// Simulates `rig` through `clip` in `scene` and records it to `output`.
+///
+/// - `progress`: called after each frame; `ControlFlow::Break` ends the recording there, whole
+///   and readable, with `is_complete` false in the report
+///
+/// # Errors
+///
+/// [`Error::Scene`] and [`Error::Recording`]; then nothing is left at `output` that was not
+/// there before.
+pub fn animate(
+    rig: Arc<Rig>,
+    clip: Clip,
+    scene: Scene,
+    output: &Path,
+    options: &AnimateOptions,
+    progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
+) -> Result<AnimateReport, Error> {
+    let wall = Instant::now();
+    let fps = options.fps.unwrap_or_else(|| recording_rate(&clip));
+    let surfaces = Surfaces::new(&rig);
+    let info = recording_info(&rig, &surfaces, fps, scene.cloth.seed, options);
+    let foxglove_layout = foxglove_layout(&info);
+    // Opened first: it refuses a bad frame rate or folder before anything is computed.
+    let mut recorder = McapRecorder::create(output, info, options.recording)?;
+    let take = clip.notes().clone();
+    let frame_count = (clip.duration() * fps + 1e-6).floor() as u64 + 1;
+    let vertex_count = rig.face.vertex_count();
+    let node_count = rig.patches.iter().map(|p| p.patch.neutral.len()).sum();
+    let run = Simulation::new(rig, scene, Some(clip))
+        .map_err(Error::from)
+        .and_then(|simulation| {
+            let run = Run::new(simulation, &surfaces, fps, frame_count);
+            run.record_all(&mut recorder, progress)
+        });
+    let measures = match run {
+        Ok(measures) => measures,
+        Err(error) => {
+            recorder.discard();
+            return Err(error);
+        }
+    };
+    let recording = recorder.finish()?;
+    Ok(AnimateReport {
+        is_complete: recording.frames == frame_count,
+        frames: recording.frames,
+        fps,
+        vertex_count,
+        node_count,
+        simulation_ms: TimeStatistics::of(measures.simulation_ms),
+        cloth_ms: TimeStatistics::of(measures.cloth_ms),
+        recording_ms: TimeStatistics::of(measures.recording_ms),
+        wall_secs: wall.elapsed().as_secs_f64(),
+        guards: measures.guards,
+        settle_rms_max: measures.settle_rms_max,
+        take,
+        recording,
+        foxglove_layout,
+    })
+}
+
+/// What is measured on the way.
+#[derive(Default)]
+struct Measures {
+    simulation_ms: Vec<f64>,
+    cloth_ms: Vec<f64>,
+    recording_ms: Vec<f64>,
+    guards: Counters,
+    settle_rms_max: f64,
+}
+
+/// A simulation on its way into a recording.
+struct Run<'a> {
+    simulation: Simulation,
+    surfaces: &'a Surfaces,
+    fps: f64,
+    frame_count: u64,
+    measures: Measures,
+    /// Vertices of each part, gathered anew every frame.
+    parts: Vec<Vec<Point3<f32>>>,
+}
+
+impl<'a> Run<'a> {
+    fn new(simulation: Simulation, surfaces: &'a Surfaces, fps: f64, frame_count: u64) -> Self {
+        Self {
+            simulation,
+            surfaces,
+            fps,
+            frame_count,
+            measures: Measures::default(),
+            parts: vec![Vec::new(); surfaces.part_vertices.len()],
+        }
+    }
+
+    fn record_all(
+        mut self,
+        recorder: &mut McapRecorder,
+        progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
+    ) -> Result<Measures, Error> {
+        self.record(recorder, &FrameReport::default())?;
+        for frame in 1..self.frame_count {
+            let clock = Instant::now();
+            let report = self.simulation.advance(1.0 / self.fps)?;
+            self.measures.simulation_ms.push(milliseconds(clock));
+            self.measures.cloth_ms.push(report.cloth_ms);
+            self.measures.guards += report.step.counters;
+            self.measures.settle_rms_max = self.measures.settle_rms_max.max(report.settle_rms);
+            self.record(recorder, &report)?;
+            let now = AnimateProgress {
+                frame: frame + 1,
+                frame_count: self.frame_count,
+                last: report,
+            };
+            if progress(now).is_break() {
+                break;
+            }
+        }
+        Ok(self.measures)
+    }
+
+    fn record(&mut self, recorder: &mut McapRecorder, report: &FrameReport) -> Result<(), Error> {
+        let clock = Instant::now();
+        let simulation = &self.simulation;
+        let skin = simulation.skin();
+        for (positions, vertices) in self.parts.iter_mut().zip(&self.surfaces.part_vertices) {
+            positions.clear();
+            positions.extend(vertices.iter().map(|&v| skin[v as usize]));
+        }
+        let parts: Vec<&[Point3<f32>]> = self.parts.iter().map(Vec::as_slice).collect();
+        let patches: Vec<&[Point3<f32>]> = (0..self.surfaces.patches.len())
+            .map(|patch| simulation.patch_positions(patch))
+            .collect();
+        recorder.record(&Frame {
+            skin,
+            patches: &patches,
+            parts: &parts,
+            head: *simulation.head(),
+            weights: &simulation.pose().weights,
+            stats: &stats(report),
+            events: guard_event(&report.step.counters).as_slice(),
+        })?;
+        self.measures.recording_ms.push(milliseconds(clock));
+        Ok(())
+    }
+}
+
+/// Names of [`stats`]. Times are left out: equal inputs give equal recordings.
+const STAT_NAMES: [&str; 9] = [
+    "settle_rms_mm",
+    "settle_max_mm",
+    "kinetic_energy",
+    "magnet_energy",
+    "stretch_energy",
+    "bend_energy",
+    "pressure_energy",
+    "total_energy",
+    "guards",
+];
+
+fn stats(report: &FrameReport) -> [f64; STAT_NAMES.len()] {
+    let energies = &report.step.energies;
+    [
+        report.settle_rms,
+        report.settle_max,
+        energies.kinetic,
+        energies.magnet,
+        energies.stretch + energies.compression + energies.shear,
+        energies.bend,
+        energies.pressure,
+        energies.total(),
+        guard_total(&report.step.counters) as f64,
+    ]
+}
+
+fn guard_total(counters: &Counters) -> u64 {
+    counters.clamped_displacements + counters.euler_fallbacks + counters.frozen_patches
+}
+
+fn guard_event(counters: &Counters) -> Option<LogEvent> {
+    (guard_total(counters) > 0).then(|| LogEvent {
+        level: LogLevel::Warning,
+        message: format!(
+            "guards acted: {} displacements clamped, {} patches on backward Euler, {} put back",
+            counters.clamped_displacements, counters.euler_fallbacks, counters.frozen_patches
+        ),
+    })
+}
+
+/// What of the rig is drawn: the skin, its loose parts, the patches.
+struct Surfaces {
+    skin: SurfaceInfo,
+    patches: Vec<SurfaceInfo>,
+    parts: Vec<SurfaceInfo>,
+    /// Vertices of the user's mesh that each part has.
+    part_vertices: Vec<Vec<u32>>,
+}
+
+const SKIN_COLOR: [u8; 4] = [224, 172, 147, 255];
+const PATCH_OPACITY: u8 = 255;
+
+impl Surfaces {
+    fn new(rig: &Rig) -> Self {
+        let vertex_count = rig.face.vertex_count();
+        // Which part each vertex belongs to, and where in it.
+        let mut owner = vec![None; vertex_count];
+        for (part, piece) in rig.parts.iter().enumerate() {
+            for (k, &vertex) in piece.vertices.iter().enumerate() {
+                owner[vertex as usize] = Some((part, k as u32));
+            }
+        }
+        let mut skin_triangles = Vec::new();
+        let mut part_triangles = vec![Vec::new(); rig.parts.len()];
+        for triangle in rig.face.triangles() {
+            match triangle.map(|v| owner[v as usize]) {
+                [Some((part, a)), Some((_, b)), Some((_, c))] => {
+                    part_triangles[part].push([a, b, c]);
+                }
+                _ => skin_triangles.push(triangle),
+            }
+        }
+        let parts = rig.parts.iter().zip(part_triangles);
+        Self {
+            skin: SurfaceInfo {
+                name: "skin".to_owned(),
+                color: SKIN_COLOR,
+                vertex_count,
+                triangles: skin_triangles,
+            },
+            patches: rig
+                .patches
+                .iter()
+                .map(|p| {
+                    let chart = &p.patch.chart;
+                    let [r, g, b] = chart.color;
+                    let quads = chart.grid.quads();
+                    SurfaceInfo {
+                        name: chart.name.clone(),
+                        color: [r, g, b, PATCH_OPACITY],
+                        vertex_count: chart.grid.node_count(),
+                        triangles: quads
+                            .iter()
+                            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                            .collect(),
+                    }
+                })
+                .collect(),
+            parts: parts
+                .map(|(part, triangles)| SurfaceInfo {
+                    name: part.name.clone(),
+                    color: part_color(&part.name),
+                    vertex_count: part.vertices.len(),
+                    triangles,
+                })
+                .collect(),
+            part_vertices: rig.parts.iter().map(|p| p.vertices.clone()).collect(),
+        }
+    }
+}
+
+fn part_color(name: &str) -> [u8; 4] {
+    if name.contains("eye") {
+        [240, 238, 232, 255]
+    } else if name.contains("teeth") {
+        [236, 228, 210, 255]
+    } else if name.contains("tongue") {
+        [190, 96, 92, 255]
+    } else {
+        [150, 140, 132, 255]
+    }
+}
+
+fn recording_info(
+    rig: &Rig,
+    surfaces: &Surfaces,
+    fps: f64,
+    seed: u64,
+    options: &AnimateOptions,
+) -> RecordingInfo {
+    RecordingInfo {
+        rig: options.rig_name.clone(),
+        template: rig.template.clone(),
+        fps,
+        seed,
+        skin: surfaces.skin.clone(),
+        patches: surfaces.patches.clone(),
+        parts: surfaces.parts.clone(),
+        weight_names: rig.shape_names.clone(),
+        stat_names: STAT_NAMES.map(str::to_owned).to_vec(),
+        extra: vec![("take".to_owned(), options.take_name.clone())],
+    }
+}
+
+fn milliseconds(clock: Instant) -> f64 {
+    clock.elapsed().as_secs_f64() * 1e3
+}

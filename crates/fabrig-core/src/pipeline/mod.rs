@@ -1,0 +1,28 @@
+//! The whole line in two calls: a mesh becomes a rig, a rig and a take become a recording.
+//!
+//! Everything here is an arrangement of the other modules; programs that need more than this
+//! call those. Both calls report progress and stop when they are asked to.
+//!
+//! ```no_run
+//! use std::ops::ControlFlow::Continue;
+//! use fabrig_core::{mesh::io::read_mesh, motion, pipeline, scene::Scene, template};
+//!
+//! # fn main() -> Result<(), fabrig_core::Error> {
+//! let face = read_mesh("face.obj")?;
+//! let rigged =
+//!     pipeline::rig_face(&face, template::human(), &Default::default(), &mut |_| Continue(()))?;
+//! rigged.rig.save("face.fabrig")?;
+//! let clip = motion::read("take.csv", &Default::default())?;
+//! let (rig, out) = (std::sync::Arc::new(rigged.rig), std::path::Path::new("out.mcap"));
+//! pipeline::animate(rig, clip, Scene::default(), out, &Default::default(), &mut |_| Continue(()))?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod animate;
+mod rig_face;
+mod timing;
+
+pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
+pub use rig_face::{RigFaceOptions, RiggedFace, rig_face};
+pub use timing::TimeStatistics;
