@@ -1,0 +1,53 @@
+"""A physical face rig from one neutral mesh.
+
+>>> import fabrig
+>>> face = fabrig.demo_face()
+>>> rig = fabrig.rig(face.vertices, face.faces)
+>>> report = fabrig.animate(rig, fabrig.demo_take(), "demo.mcap")
+"""
+
+from ._fabrig import (
+    Clip,
+    FabrigError,
+    InputError,
+    Mesh,
+    MeshError,
+    MotionError,
+    RecordingError,
+    RegistrationError,
+    Rig,
+    RigError,
+    SceneError,
+    Simulation,
+    TemplateError,
+    __version__,
+    animate,
+    demo_face,
+    demo_take,
+    read_mesh,
+    read_motion,
+    rig,
+)
+
+__all__ = [
+    "Clip",
+    "FabrigError",
+    "InputError",
+    "Mesh",
+    "MeshError",
+    "MotionError",
+    "RecordingError",
+    "RegistrationError",
+    "Rig",
+    "RigError",
+    "SceneError",
+    "Simulation",
+    "TemplateError",
+    "__version__",
+    "animate",
+    "demo_face",
+    "demo_take",
+    "read_mesh",
+    "read_motion",
+    "rig",
+]

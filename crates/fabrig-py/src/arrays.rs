@@ -1,0 +1,167 @@
+//! The one place where arrays come in and go out.
+
+use fabrig_core::Point;
+use fabrig_core::mesh::Polygons;
+use nalgebra::Point3;
+use numpy::ndarray::{Array2, ArrayView2};
+use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLike1, PyArrayLike2};
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+
+use crate::errors::input;
+
+/// Positions from anything that NumPy makes an (N, 3) array of finite numbers from.
+pub(crate) fn points(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Point>> {
+    let array: PyArrayLike2<'_, f64, AllowTypeChange> = value.extract().map_err(|_| {
+        input(format!(
+            "{name}: expected an array of numbers of shape (N, 3), got {}",
+            describe(value)
+        ))
+    })?;
+    let view: ArrayView2<'_, f64> = array.as_array();
+    if view.ncols() != 3 {
+        return Err(input(format!(
+            "{name}: expected shape (N, 3), got ({}, {})",
+            view.nrows(),
+            view.ncols()
+        )));
+    }
+    Ok(view
+        .rows()
+        .into_iter()
+        .map(|row| Point::new(row[0], row[1], row[2]))
+        .collect())
+}
+
+/// Polygons from an integer array of shape (F, corners), or a list of lists of any lengths.
+pub(crate) fn polygons(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Polygons> {
+    let index = |face: usize, corner: i64| {
+        u32::try_from(corner)
+            .map_err(|_| input(format!("{name}: face {face} has the vertex index {corner}")))
+    };
+    let mut polygons = Polygons::new();
+    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let faces: Vec<Vec<i64>> = value.extract().map_err(|_| {
+            input(format!(
+                "{name}: expected lists of whole numbers, one list a face"
+            ))
+        })?;
+        for (face, corners) in faces.into_iter().enumerate() {
+            let corners: Vec<u32> = corners
+                .into_iter()
+                .map(|c| index(face, c))
+                .collect::<PyResult<_>>()?;
+            polygons.push(&corners);
+        }
+        return Ok(polygons);
+    }
+    let kind: String = value
+        .getattr("dtype")
+        .and_then(|dtype| dtype.getattr("kind")?.extract())
+        .map_err(|_| {
+            input(format!(
+                "{name}: expected an integer array of shape (F, corners), got {}",
+                describe(value)
+            ))
+        })?;
+    if kind != "i" && kind != "u" {
+        return Err(input(format!(
+            "{name}: expected whole numbers, got {}",
+            describe(value)
+        )));
+    }
+    let array: PyArrayLike2<'_, i64, AllowTypeChange> = value.extract().map_err(|_| {
+        input(format!(
+            "{name}: expected shape (F, corners), got {}",
+            describe(value)
+        ))
+    })?;
+    for (face, row) in array.as_array().rows().into_iter().enumerate() {
+        let corners: Vec<u32> = row
+            .iter()
+            .map(|&c| index(face, c))
+            .collect::<PyResult<_>>()?;
+        polygons.push(&corners);
+    }
+    Ok(polygons)
+}
+
+/// One number per entry of something, from anything that NumPy makes an (N,) array from.
+pub(crate) fn numbers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array: PyArrayLike1<'_, f64, AllowTypeChange> = value.extract().map_err(|_| {
+        input(format!(
+            "{name}: expected an array of numbers of shape (N,), got {}",
+            describe(value)
+        ))
+    })?;
+    Ok(array.as_array().iter().copied().collect())
+}
+
+/// Rows of numbers: (row count, column count, values row by row).
+pub(crate) fn table(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(usize, usize, Vec<f64>)> {
+    let array: PyArrayLike2<'_, f64, AllowTypeChange> = value.extract().map_err(|_| {
+        input(format!(
+            "{name}: expected an array of numbers of shape (N, M), got {}",
+            describe(value)
+        ))
+    })?;
+    let view = array.as_array();
+    Ok((view.nrows(), view.ncols(), view.iter().copied().collect()))
+}
+
+/// A vector of three finite numbers.
+pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f32; 3]> {
+    match numbers(name, value)?[..] {
+        [x, y, z] if x.is_finite() && y.is_finite() && z.is_finite() => {
+            Ok([x as f32, y as f32, z as f32])
+        }
+        _ => Err(input(format!("{name}: expected three finite numbers"))),
+    }
+}
+
+/// What an argument is, for messages: its shape and type where it is an array.
+fn describe(value: &Bound<'_, PyAny>) -> String {
+    let text = |name: &str| {
+        value
+            .getattr(name)
+            .and_then(|a| a.str())
+            .map(|s| s.to_string())
+    };
+    match (text("shape"), text("dtype")) {
+        (Ok(shape), Ok(dtype)) => format!("shape {shape} of {dtype}"),
+        _ => value
+            .get_type()
+            .name()
+            .map_or_else(|_| "something else".to_owned(), |name| name.to_string()),
+    }
+}
+
+/// A fresh (N, 3) array.
+pub(crate) fn from_points<'py>(py: Python<'py>, points: &[Point]) -> Bound<'py, PyArray2<f64>> {
+    Array2::from_shape_fn((points.len(), 3), |(i, axis)| points[i][axis]).into_pyarray(py)
+}
+
+/// A fresh (N, 3) array.
+pub(crate) fn from_points_f32<'py>(
+    py: Python<'py>,
+    points: &[Point3<f32>],
+) -> Bound<'py, PyArray2<f32>> {
+    Array2::from_shape_fn((points.len(), 3), |(i, axis)| points[i][axis]).into_pyarray(py)
+}
+
+/// A fresh (N, corners) array of triangles.
+pub(crate) fn from_triangles<'py>(
+    py: Python<'py>,
+    triangles: &[[u32; 3]],
+) -> Bound<'py, PyArray2<u32>> {
+    Array2::from_shape_fn((triangles.len(), 3), |(i, corner)| triangles[i][corner]).into_pyarray(py)
+}
+
+/// Anything serializable as Python dicts and lists.
+pub(crate) fn to_python<'py>(
+    py: Python<'py>,
+    value: &impl serde::Serialize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).map_err(|e| input(e.to_string()))?;
+    py.import("json")?.call_method1("loads", (text,))
+}

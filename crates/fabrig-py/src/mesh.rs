@@ -1,0 +1,76 @@
+//! Meshes.
+
+use std::path::PathBuf;
+
+use fabrig_core::mesh::{Mesh, io};
+use fabrig_core::template;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::errors::to_py;
+
+/// A polygon mesh: vertices in any unit, polygons counter-clockwise seen from outside.
+#[pyclass(frozen, name = "Mesh", module = "fabrig")]
+pub(crate) struct PyMesh {
+    pub(crate) inner: Mesh,
+}
+
+#[pymethods]
+impl PyMesh {
+    /// From vertices of shape (N, 3) and faces: an integer array of shape (F, corners), or a
+    /// list of lists.
+    #[new]
+    fn new(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let positions = arrays::points("vertices", vertices)?;
+        let polygons = arrays::polygons("faces", faces)?;
+        let inner = Mesh::new(positions, polygons).map_err(to_py)?;
+        Ok(Self { inner })
+    }
+
+    /// Vertices, shape (N, 3).
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::from_points(py, self.inner.positions())
+    }
+
+    /// Faces as lists of vertex indices.
+    #[getter]
+    fn faces(&self) -> Vec<Vec<u32>> {
+        self.inner.polygons().iter().map(<[u32]>::to_vec).collect()
+    }
+
+    /// Faces split into triangles, shape (T, 3).
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u32>> {
+        arrays::from_triangles(py, &self.inner.triangles())
+    }
+
+    /// Writes an OBJ file.
+    fn write_obj(&self, path: PathBuf) -> PyResult<()> {
+        io::write_obj(path, &self.inner).map_err(to_py)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Mesh({} vertices, {} faces)",
+            self.inner.vertex_count(),
+            self.inner.face_count()
+        )
+    }
+}
+
+/// Reads an OBJ, PLY, STL or glTF file.
+#[pyfunction]
+pub(crate) fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<PyMesh> {
+    let inner = py.detach(|| io::read_mesh(path)).map_err(to_py)?;
+    Ok(PyMesh { inner })
+}
+
+/// The bundled face: not the template, in metres, turned, with eyes and teeth.
+#[pyfunction]
+pub(crate) fn demo_face() -> PyMesh {
+    PyMesh {
+        inner: template::demo_face(),
+    }
+}

@@ -1,0 +1,100 @@
+//! The whole line in two calls.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use fabrig_core::Point;
+use fabrig_core::mesh::Mesh;
+use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, rig_face};
+use fabrig_core::template;
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::errors::{input, to_py};
+use crate::motion::PyClip;
+use crate::progress::Progress;
+use crate::rig::PyRig;
+use crate::simulation::scene;
+
+/// Makes the rig of a neutral face.
+///
+/// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists
+/// - `landmarks`: name -> (x, y, z) in the mesh's own units
+/// - `unit_mm`: millimetres per unit, where it is known
+/// - `progress`: called with (stage, share)
+#[pyfunction]
+#[pyo3(signature = (vertices, faces, *, landmarks=None, unit_mm=None, progress=None))]
+pub(crate) fn rig(
+    py: Python<'_>,
+    vertices: &Bound<'_, PyAny>,
+    faces: &Bound<'_, PyAny>,
+    landmarks: Option<BTreeMap<String, [f64; 3]>>,
+    unit_mm: Option<f64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<PyRig> {
+    let positions = arrays::points("vertices", vertices)?;
+    let polygons = arrays::polygons("faces", faces)?;
+    let face = Mesh::new(positions, polygons).map_err(to_py)?;
+    let mut options = RigFaceOptions::default();
+    options.registration.unit_mm = unit_mm;
+    options.registration.landmarks = landmarks
+        .unwrap_or_default()
+        .into_iter()
+        .map(|(name, place)| (name, Point::from(place)))
+        .collect();
+    let mut progress = Progress::new(progress);
+    let rigged = py.detach(|| {
+        rig_face(&face, template::human(), &options, &mut |step| {
+            progress.report(step.stage, step.fraction)
+        })
+    });
+    // What the callback raised is the reason, not the cancellation that followed.
+    progress.finish()?;
+    Ok(PyRig {
+        inner: Arc::new(rigged.map_err(to_py)?.rig),
+    })
+}
+
+/// Simulates a rig through a take and records it to an MCAP file; returns a report.
+///
+/// - `fps`: frames a second; the take's own by default
+/// - `gravity` [mm/s^2] and `wind` [mm/s]: three numbers, world axes, +Y up
+/// - `progress`: called with ("simulate", share); raising or Ctrl-C ends the recording there,
+///   whole and readable
+#[pyfunction]
+#[pyo3(signature = (rig, clip, output, *, fps=None, gravity=None, wind=None, substeps=None,
+                    dynamics=true, progress=None))]
+#[allow(clippy::too_many_arguments)] // Keyword-only in Python.
+pub(crate) fn animate<'py>(
+    py: Python<'py>,
+    rig: &PyRig,
+    clip: &PyClip,
+    output: PathBuf,
+    fps: Option<f64>,
+    gravity: Option<Bound<'py, PyAny>>,
+    wind: Option<Bound<'py, PyAny>>,
+    substeps: Option<u32>,
+    dynamics: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    if let Some(fps) = fps {
+        if !(fps.is_finite() && fps > 0.0) {
+            return Err(input(format!("fps: {fps} is not a frame rate")));
+        }
+    }
+    let scene = scene(gravity.as_ref(), wind.as_ref(), substeps, dynamics)?;
+    let options = AnimateOptions {
+        fps,
+        ..AnimateOptions::default()
+    };
+    let mut progress = Progress::new(progress);
+    let (rig, clip) = (Arc::clone(&rig.inner), clip.inner.clone());
+    let report = py.detach(|| {
+        fabrig_core::pipeline::animate(rig, clip, scene, &output, &options, &mut |now| {
+            progress.report("simulate", now.frame as f64 / now.frame_count as f64)
+        })
+    });
+    progress.finish()?;
+    arrays::to_python(py, &report.map_err(to_py)?)
+}

@@ -1,0 +1,105 @@
+//! Rigs.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use fabrig_core::rig::Rig;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::errors::{input, to_py};
+use crate::mesh::PyMesh;
+
+/// A face that is ready to move.
+#[pyclass(frozen, name = "Rig", module = "fabrig")]
+pub(crate) struct PyRig {
+    pub(crate) inner: Arc<Rig>,
+}
+
+#[pymethods]
+impl PyRig {
+    /// Loads a rig file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let inner = py.detach(|| Rig::load(path)).map_err(to_py)?;
+        Ok(Self {
+            inner: Arc::new(inner),
+        })
+    }
+
+    /// Saves the rig as one file.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| self.inner.save(path)).map_err(to_py)
+    }
+
+    /// The user's mesh, in its own units and vertex order.
+    #[getter]
+    fn mesh(&self) -> PyMesh {
+        PyMesh {
+            inner: self.inner.face.clone(),
+        }
+    }
+
+    /// The face in the template's topology [mm, head frame], shape (M, 3).
+    #[getter]
+    fn normalized<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::from_points(py, &self.inner.positions)
+    }
+
+    /// Names of the shapes, in the order of weights.
+    #[getter]
+    fn shape_names(&self) -> Vec<String> {
+        self.inner.shape_names.clone()
+    }
+
+    /// Names of the patches of muscle and fat.
+    #[getter]
+    fn patch_names(&self) -> Vec<String> {
+        let patches = self.inner.patches.iter();
+        patches.map(|p| p.patch.chart.name.clone()).collect()
+    }
+
+    /// Nodes of all patches.
+    #[getter]
+    fn node_count(&self) -> usize {
+        self.inner
+            .patches
+            .iter()
+            .map(|p| p.patch.neutral.len())
+            .sum()
+    }
+
+    /// Millimetres per unit of the user's mesh.
+    #[getter]
+    fn millimetres_per_unit(&self) -> f64 {
+        self.inner.to_head.scaling()
+    }
+
+    /// What registration measured; empty for a rig that was made without it.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.inner.registration_report.as_str();
+        let text = if text.is_empty() { "{}" } else { text };
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Rig({} vertices, {} patches, {} nodes)",
+            self.inner.face.vertex_count(),
+            self.inner.patches.len(),
+            self.node_count()
+        )
+    }
+}
+
+impl PyRig {
+    /// Index of a patch by its name.
+    pub(crate) fn patch_index(&self, name: &str) -> PyResult<usize> {
+        let mut patches = self.inner.patches.iter();
+        patches
+            .position(|p| p.patch.chart.name == name)
+            .ok_or_else(|| input(format!("patch: the rig has no patch '{name}'")))
+    }
+}

@@ -1,0 +1,94 @@
+"""The whole line: a mesh and a take become a rig, a moving skin, a recording."""
+
+import pathlib
+import re
+import sys
+
+import fabrig
+import numpy as np
+import pytest
+
+README = pathlib.Path(__file__).resolve().parents[3] / "README.md"
+
+
+def test_a_rig_keeps_the_face_and_survives_the_disk(face, rig, tmp_path):
+    assert np.array_equal(rig.mesh.vertices, face.vertices)
+    assert len(rig.patch_names) == 44 and rig.node_count == 19_380
+    assert len(rig.shape_names) == 52
+    assert rig.report["template_to_face"]["median"] < 1.0
+    rig.save(tmp_path / "face.fabrig")
+    again = fabrig.Rig.load(tmp_path / "face.fabrig")
+    assert np.array_equal(again.normalized, rig.normalized)
+
+
+def test_rest_stays_and_the_jaw_opens(rig):
+    simulation = fabrig.Simulation(rig)
+    rest = rig.mesh.vertices
+    zero = np.zeros(52)
+    simulation.step(1 / 60, weights=zero)
+    assert np.abs(simulation.vertices - rest).max() * rig.millimetres_per_unit < 0.01
+    weights = zero.copy()
+    weights[rig.shape_names.index("jawOpen")] = 1
+    for _ in range(30):
+        report = simulation.step(1 / 60, weights=weights)
+    moved = np.linalg.norm(simulation.vertices - rest, axis=1) * rig.millimetres_per_unit
+    assert 20 < moved.max() < 60
+    assert report["settle_rms"] < 0.3
+    assert simulation.patch("masseter_l").shape == (420, 3)
+    for bad in (zero[:5], zero + 2, zero * np.nan):
+        with pytest.raises(fabrig.InputError, match="weights"):
+            simulation.step(1 / 60, weights=bad)
+    for dt in (0, -1, float("nan")):
+        with pytest.raises(fabrig.FabrigError):
+            simulation.step(dt)
+
+
+def test_the_readme_example_runs(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    code = re.search(r"```python\n(.*?)```", README.read_text(), re.S).group(1)
+    assert len(code.strip().splitlines()) <= 12
+    exec(compile(code, "README.md", "exec"), {})
+    assert any(path.suffix == ".mcap" for path in tmp_path.iterdir())
+
+
+def test_progress_is_reported_and_may_stop(rig, tmp_path):
+    clip = fabrig.demo_take()
+    seen = []
+
+    def stop(stage, share):
+        seen.append((stage, share))
+        if len(seen) == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fabrig.animate(rig, clip, tmp_path / "cut.mcap", progress=stop)
+    assert len(seen) == 5 and all(0 < share < 1 for _, share in seen)
+    assert (tmp_path / "cut.mcap").stat().st_size > 0
+
+
+def test_cancelled_registration_raises_what_the_callback_raised(face):
+    def stop(stage, share):
+        raise RuntimeError(stage)
+
+    with pytest.raises(RuntimeError):
+        fabrig.rig(face.vertices, face.faces, progress=stop)
+
+
+def test_bad_outputs_are_typed(rig, tmp_path):
+    with pytest.raises(fabrig.RecordingError):
+        fabrig.animate(rig, fabrig.demo_take(), tmp_path / "no" / "folder.mcap")
+    with pytest.raises(fabrig.InputError, match="wind"):
+        fabrig.animate(rig, fabrig.demo_take(), tmp_path / "a.mcap", wind=[1, 2])
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_stub_names_what_the_module_has():
+    stub = pathlib.Path(fabrig.__file__).with_name("_fabrig.pyi").read_text()
+    for name in fabrig.__all__:
+        assert re.search(rf"\b{re.escape(name)}\b", stub), name
+    extension = sys.modules["fabrig._fabrig"]
+    for kind in (fabrig.Mesh, fabrig.Rig, fabrig.Clip, fabrig.Simulation):
+        for member in vars(kind):
+            if not member.startswith("_"):
+                assert re.search(rf"def {member}\(", stub), f"{kind.__name__}.{member}"
+    assert extension.__version__ == fabrig.__version__

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change lands: style, lints, documentation, tests of the
+# core, the command line and the Python package, recordings under independent readers.
+# One profile throughout, so that dependencies compile once.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=${CARGO_TARGET_DIR:-target}
+# Building the Python package needs an interpreter; everything else does not.
+rust=(--release --workspace --exclude fabrig-py --all-features)
+
+step() { printf '\n== %s\n' "$*"; }
+
+step style
+cargo fmt --all --check
+
+step lints
+cargo clippy "${rust[@]}" --all-targets -- -D warnings
+cargo clippy --release -p fabrig-py -- -D warnings
+
+step documentation
+RUSTDOCFLAGS="-D warnings" cargo doc "${rust[@]}" --no-deps
+
+step tests
+cargo test "${rust[@]}"
+
+step python
+python3 -m venv "$target/venv"
+python="$target/venv/bin/python"
+"$python" -m pip install -q --disable-pip-version-check -r tests/requirements.txt
+rm -rf "$target/wheels"
+"$python" -m maturin build --release -m crates/fabrig-py/Cargo.toml --out "$target/wheels"
+"$python" -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
+"$python" -m pytest -q crates/fabrig-py/tests tests
