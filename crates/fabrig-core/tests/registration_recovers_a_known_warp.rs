@@ -208,6 +208,8 @@ fn the_template_maps_to_itself_with_lips_and_lids_by_side_and_its_parts_by_body(
         .collect();
     assert!(percentile(&mut off, 0.95) < 0.3);
 
+    // Its eyeballs fix the size exactly.
+    assert!((found.to_head.scaling() - 1.0).abs() < 1e-3);
     for (body, range) in bodies {
         let middle = range.start + range.len() / 2;
         let component = found

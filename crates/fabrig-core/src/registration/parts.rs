@@ -1,5 +1,6 @@
 //! Pieces of the user's mesh that are not skin: eyeballs, teeth, tongue.
 
+use nalgebra::Similarity3;
 use serde::{Deserialize, Serialize};
 
 use super::clean::CleanMesh;
@@ -57,10 +58,7 @@ pub(super) fn recognise(
 }
 
 /// Where the eyeballs of the registered face should be, with the template's radii, left first.
-pub(super) fn eye_centers(
-    model: &FaceModel<'_>,
-    registered: &[Point],
-) -> Vec<(RigidBody, Point, f64)> {
+fn eye_centers(model: &FaceModel<'_>, registered: &[Point]) -> Vec<(RigidBody, Point, f64)> {
     let mut eyes = Vec::new();
     for (kind, body, eye) in [
         (
@@ -86,6 +84,39 @@ pub(super) fn eye_centers(
         }
     }
     eyes
+}
+
+/// Where the face's eyes are, left first: the middles of its eyeballs where it has them, else
+/// behind its lids where these are open. In the frame that `to_head` leads to. [mm]
+pub(super) fn found_eyes(
+    model: &FaceModel<'_>,
+    clean: &CleanMesh,
+    to_head: &Similarity3<f64>,
+    registered: &[Point],
+    has_open_eyes: bool,
+) -> Option<[Point; 2]> {
+    let [left, right] = eye_centers(model, registered)[..] else {
+        return None;
+    };
+    let ball = |(_, expected, radius): (RigidBody, Point, f64)| {
+        clean
+            .pieces
+            .iter()
+            .filter_map(|p| p.sphere)
+            .map(|s| {
+                (
+                    to_head.transform_point(&s.center),
+                    s.radius * to_head.scaling(),
+                )
+            })
+            .filter(|(c, r)| (c - expected).norm() < radius && (0.6..1.5).contains(&(r / radius)))
+            .min_by(|a, b| (a.0 - expected).norm().total_cmp(&(b.0 - expected).norm()))
+            .map(|(center, _)| center)
+    };
+    match (ball(left), ball(right)) {
+        (Some(l), Some(r)) => Some([l, r]),
+        _ => has_open_eyes.then_some([left.1, right.1]),
+    }
 }
 
 /// A piece is an eye's when all of it lies within the eyeball, with room for size and place.
@@ -150,7 +181,7 @@ fn bounds(points: &[Point]) -> Option<(Point, Point)> {
 }
 
 /// Mean position of some vertices.
-pub(super) fn mean(positions: &[Point], vertices: &[u32]) -> Point {
+fn mean(positions: &[Point], vertices: &[u32]) -> Point {
     let sum: Vector = vertices.iter().map(|&v| positions[v as usize].coords).sum();
     Point::from(sum / vertices.len().max(1) as f64)
 }

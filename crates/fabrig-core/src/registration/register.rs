@@ -14,7 +14,7 @@ use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
 use super::openings::{Parting, find_partings, parting_pins, state_of};
-use super::parts::{RigidComponent, eye_centers, recognise};
+use super::parts::{RigidComponent, found_eyes, recognise};
 use super::refinement::refine;
 use super::report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure};
 use super::settling::{settle_hidden, unfold};
@@ -157,7 +157,23 @@ pub fn register(
     clock.finish("refine");
 
     clock.step("map", 0.9)?;
-    let to_true_size = true_size(&model, &refined, &start.to_head, options);
+    let state = |kind: OpeningKind| {
+        partings
+            .iter()
+            .find(|p| p.kind == kind)
+            .map_or(OpeningState::Fused, |p| state_of(&target, p))
+    };
+    let mouth = state(OpeningKind::Mouth);
+    let eyes = [state(OpeningKind::LeftEye), state(OpeningKind::RightEye)];
+    let has_open_eyes = eyes == [OpeningState::Open; 2];
+    let eye_places = found_eyes(&model, &cleaned, &start.to_head, &refined, has_open_eyes);
+    let to_true_size = true_size(
+        &model,
+        &refined,
+        &start.to_head,
+        options.unit_mm,
+        eye_places,
+    );
     let to_head = to_true_size * start.to_head;
     let positions: Vec<Point> = refined
         .iter()
@@ -187,12 +203,6 @@ pub fn register(
 
     let measured = target_of(&cleaned, start.piece, &to_head)?;
     let measures = measure(&model, &measured, &positions)?;
-    let state = |kind: OpeningKind| {
-        partings
-            .iter()
-            .find(|p| p.kind == kind)
-            .map_or(OpeningState::Fused, |p| state_of(&target, p))
-    };
     let landmark_distances = (!landmarks.names.is_empty()).then(|| {
         DistanceStatistics::from_distances(
             landmarks
@@ -210,7 +220,7 @@ pub fn register(
             measures.folded_triangles
         ));
     }
-    if state(OpeningKind::Mouth) == OpeningState::Fused {
+    if mouth == OpeningState::Fused {
         warnings.push("the lips are one closed surface: they stretch when they part".to_owned());
     }
     clock.finish("report");
@@ -226,8 +236,8 @@ pub fn register(
         coverage: measures.coverage,
         folded_triangles: measures.folded_triangles,
         triangle_quality: measures.triangle_quality,
-        mouth: state(OpeningKind::Mouth),
-        eyes: [state(OpeningKind::LeftEye), state(OpeningKind::RightEye)],
+        mouth,
+        eyes,
         times: std::mem::take(&mut clock.times),
         warnings,
     };
@@ -450,14 +460,16 @@ impl Pins {
     }
 }
 
-/// From the frame of the first alignment to the head frame proper: eyes as far apart as the
-/// template's (or the unit that the user gave), turned and placed for the least distance
-/// between the registered face and the template's.
+/// From the frame of the first alignment to the head frame proper, turned and placed for the
+/// least distance between the registered face and the template's. The size is that of the unit
+/// the user gave; else eyes as far apart as the template's, by the user's eyeballs or by open
+/// lids; else the size that fits best (closed lids tell little of where eyes are).
 fn true_size(
     model: &FaceModel<'_>,
     registered: &[Point],
     to_head: &Similarity3<f64>,
-    options: &RegistrationOptions,
+    unit_mm: Option<f64>,
+    eyes: Option<[Point; 2]>,
 ) -> Similarity3<f64> {
     let face: Vec<usize> = (0..registered.len())
         .filter(|&v| model.roles[v] == Role::Face)
@@ -468,14 +480,13 @@ fn true_size(
     let Some(fitted) = umeyama(&from, &to, &weights) else {
         return Similarity3::identity();
     };
-    let scale = match (options.unit_mm, &eye_centers(model, registered)[..]) {
+    let scale = match (unit_mm, eyes) {
         (Some(unit), _) => unit / to_head.scaling(),
-        (None, [left, right]) => {
-            let own = (left.1 - right.1).norm();
-            let eyes = &model.template.eyes;
-            (eyes[0].center - eyes[1].center).norm() / own
+        (None, Some([left, right])) => {
+            let [own_left, own_right] = model.template.eyes.map(|e| e.center);
+            (own_left - own_right).norm() / (left - right).norm()
         }
-        _ => fitted.scaling(),
+        (None, None) => fitted.scaling(),
     };
     let rotation: UnitQuaternion<f64> = fitted.isometry.rotation;
     let middle = |points: &[Point]| {
