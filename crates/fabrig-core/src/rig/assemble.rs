@@ -160,6 +160,7 @@ pub fn build(
 
     Ok(Rig {
         template: template.name.clone(),
+        template_version: template.version,
         shape_names: template.shapes.iter().map(|s| s.name.clone()).collect(),
         face: face.clone(),
         to_head,

@@ -55,6 +55,8 @@ pub struct RigPatch {
 pub struct Rig {
     /// Name of the template that it was made with.
     pub template: String,
+    /// Version of that template's contents.
+    pub template_version: u32,
     /// Names of the template's shapes, in the order of weights.
     pub shape_names: Vec<String>,
     /// The user's mesh, in its own units and vertex order.

@@ -80,6 +80,8 @@ pub(super) struct BuildRecipe {
     pub(super) lids: LidRecipe,
     /// How the lips are put right.
     pub(super) lips: LipRecipe,
+    /// How inner skin is kept still.
+    pub(super) linings: LiningRecipe,
     /// Targets and how much of each makes the identity.
     pub(super) identity: BTreeMap<String, f64>,
 }
@@ -100,6 +102,17 @@ pub(super) struct LidRecipe {
     pub(super) blur: f64,
     /// How much nearer to the eyeball's centre the next ring of the margin must be. [mm]
     pub(super) ring_step: f64,
+}
+
+/// How shapes are corrected on inner skin.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LiningRecipe {
+    /// Distances from the lids up to which a socket's skin moves fully, and from which not at
+    /// all. [mm]
+    pub(super) socket: [f64; 2],
+    /// Beginnings of the names of shapes that do not move the mouth cavity.
+    pub(super) leave_mouth_still: Vec<String>,
 }
 
 /// How shapes are corrected at the lips.

@@ -20,6 +20,7 @@ mod decimate;
 mod face;
 mod identity;
 mod lids;
+mod linings;
 mod lips;
 mod pack;
 mod regions;

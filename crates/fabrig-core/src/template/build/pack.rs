@@ -5,6 +5,7 @@ use std::path::Path;
 use super::crop::{Head, crop_head};
 use super::identity::{dense, identity, symmetric_left, symmetrize};
 use super::lids::Lids;
+use super::linings::Linings;
 use super::lips::{LipVertices, Lips};
 use super::regions::{EdgeGraph, paint_regions};
 use super::rigid::{PARTS, Part, fit_hinge, fit_sphere, mean, part};
@@ -129,7 +130,10 @@ pub fn build_geometry(
             back: positions[corner as usize].z - recipe.lips.lining,
         },
     );
-    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids, &lips)?;
+    let linings = Linings::new(&recipe.linings, &positions, &|v| {
+        &region_names[labels[v as usize] as usize].name
+    });
+    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids, &lips, &linings)?;
     let geometry = StoredGeometry {
         vertex_regions: labels,
         skin,
@@ -220,6 +224,7 @@ fn stored_shapes(
     head: &Head,
     lids: &Lids<'_>,
     lips: &Lips<'_>,
+    linings: &Linings<'_>,
 ) -> Result<NamedShapes, TemplateError> {
     let mut stored: Vec<(String, StoredShape)> = Vec::new();
     let mut amplitudes: Vec<(String, f64)> = Vec::new();
@@ -236,6 +241,7 @@ fn stored_shapes(
                     None => None,
                 };
                 lips.correct(&mut deltas, over.as_deref());
+                linings.correct(name, &mut deltas);
                 let amplitude = deltas.iter().map(|d| d.norm()).fold(0.0, f64::max);
                 (StoredShape::Deltas(sparse(&deltas)), amplitude)
             }
