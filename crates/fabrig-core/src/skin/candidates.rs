@@ -20,6 +20,9 @@ const LEAST_NORMAL_COSINE: f64 = -0.3;
 const CAVITIES: [&str; 3] = ["mouth_interior", "socket", "nostril"];
 /// Inner skin looks for nodes this much further, since distance is to the outer skin.
 const CAVITY_REACH: f64 = 1.5;
+/// Inner skin is moved by more of the flesh around it: it takes this many times as many patches
+/// and nodes.
+const CAVITY_CHOICE: usize = 2;
 
 struct Anchor {
     /// The place on the skin above the node. [mm]
@@ -109,7 +112,7 @@ impl<'a> CandidateFinder<'a> {
     pub fn find(&self, vertex: usize, normal: &Vector) -> Vec<Candidate> {
         let region = self.template.regions.vertex_regions[vertex];
         if !self.is_cavity(region) {
-            let outer = self.find_where(vertex, self.reach, |anchor| {
+            let outer = self.find_where(vertex, self.reach, 1, |anchor| {
                 !self.template.regions.are_apart(region, anchor.region)
                     && anchor.normal.dot(normal) >= LEAST_NORMAL_COSINE
             });
@@ -117,7 +120,7 @@ impl<'a> CandidateFinder<'a> {
                 return outer;
             }
         }
-        self.find_where(vertex, CAVITY_REACH * self.reach, |anchor| {
+        self.find_where(vertex, CAVITY_REACH * self.reach, CAVITY_CHOICE, |anchor| {
             !self.is_opposite(region, anchor.region)
         })
     }
@@ -143,6 +146,7 @@ impl<'a> CandidateFinder<'a> {
         &self,
         vertex: usize,
         reach: f64,
+        choice: usize,
         is_allowed: impl Fn(&Anchor) -> bool,
     ) -> Vec<Candidate> {
         let point = self.template.skin.positions()[vertex];
@@ -164,7 +168,7 @@ impl<'a> CandidateFinder<'a> {
             }
         }
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearest.truncate(self.patch_limit);
+        nearest.truncate(choice * self.patch_limit);
         let mut found = Vec::new();
         for (_, patch, anchor) in nearest {
             for a in self.grid_around(patch, anchor - self.starts[patch]) {
@@ -179,7 +183,7 @@ impl<'a> CandidateFinder<'a> {
             }
         }
         found.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.node.cmp(&b.node)));
-        found.truncate(self.candidate_limit);
+        found.truncate(choice * self.candidate_limit);
         found.sort_by_key(|c| c.node);
         found
     }
