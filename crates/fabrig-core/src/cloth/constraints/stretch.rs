@@ -115,14 +115,15 @@ pub(crate) fn project_edge<R: Real>(
     compliance: &StretchCompliance<R>,
 ) -> (Vec3<R>, Vec3<R>) {
     let d = a - b;
-    let length = d.dot(d).sqrt();
-    let inverse = R::splat(1.0) / length.max(R::splat(SHORTEST));
+    let squared = d.dot(d);
+    let length = squared.sqrt();
     let c = length - rest;
     let alpha = R::select_less(c, R::splat(0.0), compliance.compression, compliance.stretch);
-    let rate = d.dot(d - resting) * inverse;
     let bottom = (wa + wb) * (R::splat(1.0) + compliance.gamma) + alpha;
-    // Minus the multiplier over the length, so that `d` need not be normalized.
-    let s = (c + compliance.gamma * rate) * inverse / bottom;
+    // Minus the multiplier over the length, so that `d` need not be normalized; everything
+    // over the length squared, so that there is one division.
+    let top = c * length + compliance.gamma * d.dot(d - resting);
+    let s = top / (bottom * squared.max(R::splat(SHORTEST * SHORTEST)));
     (d * -(s * wa), d * (s * wb))
 }
 

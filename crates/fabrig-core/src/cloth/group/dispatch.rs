@@ -1,0 +1,168 @@
+//! A group behind its interface, with the hot parts compiled for the processor's vectors.
+
+use nalgebra::Point3;
+
+use super::interface::{GroupPairs, Monitor, PatchGroup, Substep};
+use super::state::{FARTHEST, Group};
+use crate::cloth::constraints::attachment::Port;
+use crate::cloth::input::PatchMotion;
+use crate::cloth::lanes::Real;
+use crate::cloth::report::Energies;
+
+impl<R: Real> PatchGroup for Group<R> {
+    fn patches(&self) -> &[usize] {
+        &self.patches
+    }
+
+    fn set_pairs(&mut self, pairs: GroupPairs) {
+        self.pairs = pairs;
+    }
+
+    fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
+        self.starts.copy_from_slice(&self.ends);
+        self.load_ends(1.0, targets);
+        self.load_anchors(1.0, anchors);
+        vectorized(BeginFrame(self, 1.0));
+        self.edge_lengths.hold();
+        self.diagonal_lengths.hold();
+        for lane in 0..R::LANES {
+            if !self.lane_states[lane].has_velocity {
+                for v in &mut self.end_velocities {
+                    v.set_lane(lane, [0.0; 3]);
+                }
+            }
+            self.clear_lane(lane);
+            self.lane_states[lane].energy = 0.0;
+            self.lane_states[lane].mismatch = self.mismatch.lane(lane);
+            self.lane_states[lane].euler_frames = 0;
+        }
+    }
+
+    fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]) {
+        let inv = R::splat(dt);
+        self.starts.copy_from_slice(&self.ends);
+        for (slope, v) in self.start_slopes.iter_mut().zip(&self.end_velocities) {
+            *slope = *v * inv;
+        }
+        let had_velocity: Vec<bool> = self.lane_states.iter().map(|s| s.has_velocity).collect();
+        self.load_ends(dt, targets);
+        for lane in 0..R::LANES {
+            // After a straight segment nothing is known about the velocity here.
+            if !had_velocity[lane] {
+                for i in 0..self.starts.len() {
+                    let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
+                    self.start_slopes[i].set_lane(lane, [0, 1, 2].map(|k| b[k] - a[k]));
+                }
+            }
+        }
+        self.load_anchors(dt, anchors);
+        self.clamped = R::splat(0.0);
+        vectorized(BeginFrame(self, dt));
+    }
+
+    fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>) {
+        vectorized(Predict(self, substep));
+        self.write_ports(ports);
+    }
+
+    fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]) {
+        self.solve_pairs(ports);
+        vectorized(Solve(self, substep));
+        for state in &mut self.lane_states {
+            state.has_history = true;
+        }
+    }
+
+    fn end_frame(&mut self, monitors: &mut Vec<Monitor>) {
+        let sums = vectorized(EnergyOf(self));
+        let anchors = self.anchor_energies();
+        monitors.clear();
+        for lane in 0..self.patches.len() {
+            let energies = Energies {
+                kinetic: sums[0].lane(lane),
+                magnet: sums[1].lane(lane),
+                anchors: anchors[lane][0],
+                stretch: sums[2].lane(lane),
+                compression: sums[3].lane(lane),
+                shear: sums[4].lane(lane),
+                bend: sums[5].lane(lane),
+                pressure: sums[6].lane(lane),
+            };
+            let mut squared = 0.0;
+            for u in &self.displacements {
+                squared += u.dot(*u).lane(lane);
+            }
+            let state = &mut self.lane_states[lane];
+            let mismatch = self.mismatch.lane(lane) + anchors[lane][1];
+            monitors.push(Monitor {
+                energies,
+                before: state.energy,
+                drive: self.drive.lane(lane),
+                mismatch: mismatch + state.mismatch,
+                clamped: self.clamped.lane(lane) as u64,
+                is_sound: energies.total().is_finite() && squared < FARTHEST * FARTHEST,
+            });
+            state.energy = energies.total();
+            state.mismatch = mismatch;
+            state.euler_frames = state.euler_frames.saturating_sub(1);
+        }
+    }
+
+    fn fall_back(&mut self, lane: usize, frames: u32) {
+        self.lane_states[lane].euler_frames = frames;
+    }
+
+    fn freeze(&mut self, lane: usize) {
+        self.clear_lane(lane);
+        self.lane_states[lane].energy = 0.0;
+    }
+
+    fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]) {
+        for (i, p) in positions.iter_mut().enumerate() {
+            let u = self.displacements[i].lane(lane);
+            let end = &self.end_positions[lane][i];
+            *p = Point3::new(
+                (f64::from(end.x) + u[0]) as f32,
+                (f64::from(end.y) + u[1]) as f32,
+                (f64::from(end.z) + u[2]) as f32,
+            );
+        }
+    }
+
+    fn node_state(&self, lane: usize, node: usize) -> ([f64; 3], [f64; 3]) {
+        let u = self.displacements[node].lane(lane);
+        let end = &self.end_positions[lane][node];
+        (
+            [0, 1, 2].map(|axis| f64::from(end[axis]) + u[axis]),
+            self.velocities[node].lane(lane),
+        )
+    }
+}
+
+/// Runs `work` compiled for the widest vector instructions that this processor has.
+///
+/// A closure would not do: it is compiled for the baseline unless it happens to be inlined.
+fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
+    pulp::Arch::new().dispatch(work)
+}
+
+macro_rules! vectorized_work {
+    ($name:ident<$($field:ty),*> -> $output:ty, |$group:ident, $($argument:ident)?| $body:expr) => {
+        struct $name<'a, R>(&'a mut Group<R>, $($field),*);
+
+        impl<R: Real> pulp::NullaryFnOnce for $name<'_, R> {
+            type Output = $output;
+
+            #[inline(always)]
+            fn call(self) -> $output {
+                let Self($group, $($argument)?) = self;
+                $body
+            }
+        }
+    };
+}
+
+vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
+vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
+vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
+vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());

@@ -1,0 +1,165 @@
+//! The ends of a frame: targets and anchors in, energies out.
+
+use super::state::{Group, relative};
+use crate::cloth::constraints::bend::{BendCompliance, bend_energy};
+use crate::cloth::constraints::pressure::swept_volume;
+use crate::cloth::constraints::shear::shear_energy;
+use crate::cloth::constraints::stretch::stretch_energy;
+use crate::cloth::input::PatchMotion;
+use crate::cloth::lanes::{Real, Vec3};
+
+impl<R: Real> Group<R> {
+    /// Patch of a lane; lanes to spare repeat the last one.
+    pub(super) fn patch_of(&self, lane: usize) -> usize {
+        self.patches[lane.min(self.patches.len() - 1)]
+    }
+
+    /// Loads target ends into the lanes. Straight motion is marked by lane.
+    pub(super) fn load_ends(&mut self, dt: f64, targets: &[PatchMotion]) {
+        for lane in 0..R::LANES {
+            let motion = &targets[self.patch_of(lane)];
+            let center = self.origin.lane(lane);
+            for (end, p) in self.ends.iter_mut().zip(&motion.positions) {
+                end.set_lane(lane, relative(p, center));
+            }
+            self.lane_states[lane].has_velocity = !motion.velocities.is_empty();
+            for (i, slope) in self.end_slopes.iter_mut().enumerate() {
+                match motion.velocities.get(i) {
+                    Some(v) => slope.set_lane(lane, [0, 1, 2].map(|a| f64::from(v[a]) * dt)),
+                    None => {
+                        let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
+                        slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
+                    }
+                }
+            }
+        }
+        for (lane, kept) in self.end_positions.iter_mut().enumerate() {
+            kept.copy_from_slice(&targets[self.patches[lane]].positions);
+        }
+    }
+
+    pub(super) fn load_anchors(&mut self, dt: f64, anchors: &[PatchMotion]) {
+        for anchor in &mut self.anchors {
+            let old = anchor.segment;
+            for axis in 0..3 {
+                anchor.start[axis] += old[0][axis];
+            }
+            anchor.segment = [[0.0; 3]; 3];
+            let old_velocity = anchor.velocity.take();
+            let Some(motion) = anchors.get(self.patches[anchor.lane]) else {
+                continue;
+            };
+            let center = self.origin.lane(anchor.lane);
+            // Rounded as the targets are, so that an anchor on its target pulls not at all.
+            let mut end = Vec3::<R>::zero();
+            end.set_lane(0, relative(&motion.positions[anchor.index], center));
+            let end = end.lane(0);
+            let chord = [0, 1, 2].map(|axis| end[axis] - anchor.start[axis]);
+            anchor.velocity = motion
+                .velocities
+                .get(anchor.index)
+                .map(|v| [0, 1, 2].map(|axis| f64::from(v[axis])));
+            let slope = |v: Option<[f64; 3]>| v.map_or(chord, |v| v.map(|x| x * dt));
+            anchor.segment = [chord, slope(old_velocity), slope(anchor.velocity)];
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn begin_frame_lanes(&mut self, dt: f64) {
+        let inv_dt = R::splat(1.0 / dt);
+        let (two, four, six) = (R::splat(2.0), R::splat(4.0), R::splat(6.0));
+        let inv_dt2 = inv_dt * inv_dt;
+        let (mut jerk, mut jump) = (R::splat(0.0), R::splat(0.0));
+        for i in 0..self.ends.len() {
+            let chord = self.ends[i] - self.starts[i];
+            let (a, b) = (self.start_slopes[i], self.end_slopes[i]);
+            self.chords[i] = chord;
+            let first = (chord * six - a * four - b * two) * inv_dt2;
+            let last = (a * two + b * four - chord * six) * inv_dt2;
+            jerk += first.dot(first).max(last.dot(last));
+            let kick = a * inv_dt - self.end_velocities[i];
+            jump += kick.dot(kick);
+            self.end_velocities[i] = b * inv_dt;
+        }
+        let half_mass = (R::splat(0.5) * self.mass).sqrt();
+        self.drive = half_mass * (jerk.sqrt() * R::splat(dt) + jump.sqrt());
+        let stretch = self.edge_lengths.begin_frame(&self.lists.edges, &self.ends);
+        let shear = self
+            .diagonal_lengths
+            .begin_frame(&self.lists.diagonals, &self.ends);
+        let k = self.stretch[0].max(self.stretch[1]);
+        self.mismatch = R::splat(0.5) * (k * stretch + self.shear * shear);
+    }
+
+    /// Energies of all lanes at the end of the frame.
+    #[inline(always)]
+    pub(super) fn energy_lanes(&mut self) -> [R; 7] {
+        let half = R::splat(0.5);
+        let (mut kinetic, mut magnet) = (R::splat(0.0), R::splat(0.0));
+        for i in 0..self.displacements.len() {
+            let u = self.displacements[i];
+            let v = self.velocities[i] - self.end_velocities[i];
+            kinetic += v.dot(v);
+            magnet += u.dot(u);
+            self.solution[i] = self.ends[i] + u;
+        }
+        let one = R::splat(1.0);
+        let x = &self.solution;
+        let [stretch, compression] =
+            stretch_energy(&self.lists.edges, x, &self.edge_lengths, self.stretch);
+        let shear = shear_energy(&self.lists.diagonals, x, &self.diagonal_lengths, self.shear);
+        let bend = BendCompliance {
+            compliance: one,
+            dropoff: self.bend_dropoff,
+            inv_edge_squared: self.inv_edge_squared,
+        };
+        let bend = bend_energy(&self.lists.triples, &self.displacements, self.bend, &bend);
+        let mut pressure = R::splat(0.0);
+        if self.has_pressure {
+            let volume = swept_volume(
+                &self.lists.cells,
+                &self.ends,
+                &self.displacements,
+                &mut self.gradient,
+            );
+            pressure = half * self.pressure * volume * volume;
+        }
+        [
+            half * self.mass * kinetic,
+            half * self.magnet.stiffness * magnet,
+            stretch,
+            compression,
+            shear,
+            bend,
+            pressure,
+        ]
+    }
+
+    /// Anchor energy of a lane, and the energy an anchor would have on the target.
+    pub(super) fn anchor_energies(&self) -> Vec<[f64; 2]> {
+        let mut sums = vec![[0.0; 2]; self.patches.len()];
+        for anchor in &self.anchors {
+            let (node, lane) = (anchor.node, anchor.lane);
+            let target = self.ends[node].lane(lane);
+            let u = self.displacements[node].lane(lane);
+            for axis in 0..3 {
+                let a = anchor.start[axis] + anchor.segment[0][axis] - target[axis];
+                sums[lane][0] += 0.5 * anchor.stiffness * (u[axis] - a).powi(2);
+                sums[lane][1] += 0.5 * anchor.stiffness * a * a;
+            }
+        }
+        sums
+    }
+
+    pub(super) fn clear_lane(&mut self, lane: usize) {
+        for i in 0..self.displacements.len() {
+            let velocity = self.end_velocities[i].lane(lane);
+            self.displacements[i].set_lane(lane, [0.0; 3]);
+            self.previous_displacements[i].set_lane(lane, [0.0; 3]);
+            self.velocities[i].set_lane(lane, velocity);
+            self.previous_velocities[i].set_lane(lane, velocity);
+            self.target_steps[i].set_lane(lane, [0.0; 3]);
+        }
+        self.lane_states[lane].has_history = false;
+    }
+}

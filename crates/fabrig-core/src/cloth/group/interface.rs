@@ -1,0 +1,95 @@
+//! What the solver sees of a group, whatever its lane type.
+
+use nalgebra::Point3;
+
+use crate::cloth::constraints::attachment::Port;
+use crate::cloth::input::PatchMotion;
+use crate::cloth::report::Energies;
+
+/// One substep, the same for all groups.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Substep {
+    /// Duration. [s]
+    pub(crate) h: f64,
+    /// Duration of the one before. [s]
+    pub(crate) previous_h: f64,
+    /// Progress through the frame before and after, 0 to 1.
+    pub(crate) progress: [f64; 2],
+    /// Uniform acceleration. [mm/s^2]
+    pub(crate) uniform: [f64; 3],
+    /// Angular velocity [rad/s] and acceleration [rad/s^2] of the head frame.
+    pub(crate) angular: [[f64; 3]; 2],
+    /// Air velocity. [mm/s]
+    pub(crate) wind: [f64; 3],
+}
+
+impl Substep {
+    /// Whether acceleration differs from node to node.
+    pub(super) fn has_field(&self) -> bool {
+        self.angular != [[0.0; 3]; 2] || self.wind != [0.0; 3]
+    }
+}
+
+/// The pairs of a group's nodes with nodes of other patches.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct GroupPairs {
+    /// (node, lane) of every node that has pairs.
+    pub(crate) nodes: Vec<(u32, u32)>,
+    /// Partners of each such node.
+    pub(crate) partners: Vec<Vec<Partner>>,
+}
+
+/// The other end of a pair.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Partner {
+    /// Its group.
+    pub(crate) group: usize,
+    /// Its index among the ports of that group.
+    pub(crate) port: usize,
+    /// k. [mass/s^2]
+    pub(crate) stiffness: f64,
+}
+
+/// What the energy monitor looks at, per patch.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Monitor {
+    /// Energies now.
+    pub(crate) energies: Energies,
+    /// Energy before the frame.
+    pub(crate) before: f64,
+    /// Square root of the kinetic energy that moving targets and fields can give. It adds to
+    /// the square root of the energy there was.
+    pub(crate) drive: f64,
+    /// Energy by which rest lengths and anchors differ from the targets.
+    pub(crate) mismatch: f64,
+    /// Displacements that were held back.
+    pub(crate) clamped: u64,
+    /// Whether all of the state is finite and near.
+    pub(crate) is_sound: bool,
+}
+
+/// A group behind its lane type.
+pub(crate) trait PatchGroup: Send + Sync {
+    /// Patches of the lanes.
+    fn patches(&self) -> &[usize];
+    /// Replaces the pairs.
+    fn set_pairs(&mut self, pairs: GroupPairs);
+    /// Puts the cloth on the targets, moving with them.
+    fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]);
+    /// Starts a frame of `dt` seconds.
+    fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);
+    /// First half of a substep: up to the inertial target. Fills `ports`.
+    fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>);
+    /// Second half of a substep: the constraints. Reads the ports of all groups.
+    fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]);
+    /// Ends the frame: what the monitor sees, per patch.
+    fn end_frame(&mut self, monitors: &mut Vec<Monitor>);
+    /// Takes backward Euler steps for a patch for `frames` frames.
+    fn fall_back(&mut self, lane: usize, frames: u32);
+    /// Puts a patch back to its target.
+    fn freeze(&mut self, lane: usize);
+    /// Writes positions of a patch. [mm, head frame]
+    fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]);
+    /// Position and velocity of one node in full precision. [mm, mm/s]
+    fn node_state(&self, lane: usize, node: usize) -> ([f64; 3], [f64; 3]);
+}

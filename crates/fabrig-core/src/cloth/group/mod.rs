@@ -1,0 +1,13 @@
+//! A group: patches of one grid shape in the lanes of one register, and one substep of them.
+//!
+//! Everything a substep needs is kept as arrays of one entry per node (or edge), each entry
+//! holding that node of every patch. Nothing is allocated while stepping.
+
+mod dispatch;
+mod frame;
+mod interface;
+mod state;
+mod substep;
+
+pub(crate) use interface::{GroupPairs, Monitor, Partner, PatchGroup, Substep};
+pub(crate) use state::Group;

@@ -1,0 +1,305 @@
+//! The state of a group, and how it is made from patches.
+
+use nalgebra::Point3;
+
+use super::interface::GroupPairs;
+use crate::cloth::constraints::grid_lists::GridLists;
+use crate::cloth::constraints::magnet::Magnet;
+use crate::cloth::constraints::stretch::{RestLengths, edge_length};
+use crate::cloth::constraints::wind::Air;
+use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator};
+use crate::cloth::lanes::{Real, Vec3};
+
+/// Displacements further than this are taken for a failure. [mm]
+pub(super) const FARTHEST: f64 = 1e5;
+
+/// An anchored node.
+#[derive(Debug, Clone)]
+pub(super) struct Anchor {
+    pub(super) node: usize,
+    pub(super) lane: usize,
+    /// Index among the anchors of its patch.
+    pub(super) index: usize,
+    /// k. [mass/s^2]
+    pub(super) stiffness: f64,
+    /// Position at the end of the frame before. [mm, relative to the patch's centre]
+    pub(super) start: [f64; 3],
+    /// Hermite segment of this frame: chord and slopes. [mm]
+    pub(super) segment: [[f64; 3]; 3],
+    /// Velocity at the end of the frame, if known. [mm/s]
+    pub(super) velocity: Option<[f64; 3]>,
+}
+
+/// Per-lane bookkeeping.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LaneState {
+    pub(super) has_history: bool,
+    pub(super) euler_frames: u32,
+    pub(super) energy: f64,
+    pub(super) mismatch: f64,
+    /// Whether the end slopes of the last frame came from given velocities.
+    pub(super) has_velocity: bool,
+}
+
+/// Patches of one shape, side by side.
+pub(crate) struct Group<R> {
+    pub(super) patches: Vec<usize>,
+    pub(super) integrator: Integrator,
+    pub(super) has_pressure: bool,
+    /// Centre of each patch, which positions are relative to. [mm, head frame]
+    pub(super) origin: Vec3<R>,
+
+    pub(super) mass: R,
+    pub(super) magnet: Magnet<R>,
+    pub(super) damping: R,
+    /// Stretch and compression. [mass/s^2]
+    pub(super) stretch: [R; 2],
+    pub(super) stretch_damping_time: R,
+    pub(super) shear: R,
+    pub(super) bend: R,
+    pub(super) bend_dropoff: R,
+    pub(super) pressure: R,
+    pub(super) inv_edge_squared: R,
+    /// Half the mean edge, squared. [mm^2]
+    pub(super) clamp_squared: R,
+    pub(super) air: Air<R>,
+    pub(super) inv_air_mass: R,
+    /// Sum of anchor stiffnesses per node. [mass/s^2]
+    pub(super) anchor_stiffness: Vec<R>,
+    pub(super) anchors: Vec<Anchor>,
+    pub(super) pairs: GroupPairs,
+
+    pub(super) lists: GridLists,
+    pub(super) edge_lengths: RestLengths<R>,
+    pub(super) diagonal_lengths: RestLengths<R>,
+
+    pub(super) displacements: Vec<Vec3<R>>,
+    pub(super) previous_displacements: Vec<Vec3<R>>,
+    pub(super) velocities: Vec<Vec3<R>>,
+    pub(super) previous_velocities: Vec<Vec3<R>>,
+    /// How far the targets moved in the last substep. [mm]
+    pub(super) target_steps: Vec<Vec3<R>>,
+
+    /// Targets at the start of the frame, relative to the centre. [mm]
+    pub(super) starts: Vec<Vec3<R>>,
+    /// Hermite segments: chord, slope at the start and at the end, times dt. [mm]
+    pub(super) chords: Vec<Vec3<R>>,
+    pub(super) start_slopes: Vec<Vec3<R>>,
+    pub(super) end_slopes: Vec<Vec3<R>>,
+    /// Targets at the end of the frame, relative to the centre. [mm]
+    pub(super) ends: Vec<Vec3<R>>,
+    /// Velocities of the targets at the end of the frame. [mm/s]
+    pub(super) end_velocities: Vec<Vec3<R>>,
+    /// Targets at the end of the frame as given. [mm, head frame]
+    pub(super) end_positions: Vec<Vec<Point3<f32>>>,
+
+    /// Targets at the end of the substep, relative to the centre. [mm]
+    pub(super) targets: Vec<Vec3<R>>,
+    /// Displacements, then positions, that are being solved for. [mm]
+    pub(super) solution: Vec<Vec3<R>>,
+    /// x_b - X. [mm]
+    pub(super) past: Vec<Vec3<R>>,
+    /// X + u_b. [mm]
+    pub(super) resting: Vec<Vec3<R>>,
+    pub(super) inv_masses: Vec<R>,
+    pub(super) accelerations: Vec<Vec3<R>>,
+    pub(super) gradient: Vec<Vec3<R>>,
+
+    /// Effective step for which `inv_masses` holds.
+    pub(super) masses_h_e: R,
+    pub(super) h_e: R,
+    pub(super) clamped: R,
+    pub(super) drive: R,
+    pub(super) mismatch: R,
+    pub(super) lane_states: Vec<LaneState>,
+}
+
+impl<R: Real> Group<R> {
+    /// A group of `patches` (indices into `all`), at rest.
+    pub(crate) fn new(all: &[ClothPatch], patches: &[usize], options: &ClothOptions) -> Self {
+        let shape = all[patches[0]].shape;
+        let n = shape.node_count();
+        // Lanes to spare repeat the last patch, so that their arithmetic is sound too.
+        let of_lane = |lane: usize| patches[lane.min(patches.len() - 1)];
+        let per_lane = |value: &dyn Fn(&ClothPatch) -> f64| {
+            let mut out = R::splat(0.0);
+            for lane in 0..R::LANES {
+                out.set_lane(lane, value(&all[of_lane(lane)]));
+            }
+            out
+        };
+        let zero = vec![Vec3::<R>::zero(); n];
+        let mut origin = Vec3::zero();
+        let mut rest = zero.clone();
+        for lane in 0..R::LANES {
+            let nodes = &all[of_lane(lane)].rest;
+            let mut sum = [0.0; 3];
+            for p in nodes {
+                for axis in 0..3 {
+                    sum[axis] += f64::from(p[axis]);
+                }
+            }
+            // Whole millimetres: exact in any precision, and a mirrored patch has the
+            // mirrored centre.
+            let center = sum.map(|s| (s / n as f64).round());
+            origin.set_lane(lane, center);
+            for (local, p) in rest.iter_mut().zip(nodes) {
+                local.set_lane(lane, relative(p, center));
+            }
+        }
+        let lists = GridLists::new(shape);
+        let mean_edge = mean_edge(&lists.edges, &rest);
+        let area = |p: &ClothPatch| rest_area(p);
+        let mut anchor_stiffness = vec![R::splat(0.0); n];
+        let mut anchors = Vec::new();
+        for (lane, &patch) in patches.iter().enumerate() {
+            let mut index = 0;
+            for (nodes, strength) in all[patch].anchor_sets() {
+                let stiffness = strength * all[patch].material.stretch_stiffness();
+                for &node in nodes {
+                    let node = node as usize;
+                    let sum = anchor_stiffness[node].lane(lane) + stiffness;
+                    anchor_stiffness[node].set_lane(lane, sum);
+                    anchors.push(Anchor {
+                        node,
+                        lane,
+                        index,
+                        stiffness,
+                        start: rest[node].lane(lane),
+                        segment: [[0.0; 3]; 3],
+                        velocity: None,
+                    });
+                    index += 1;
+                }
+            }
+        }
+        let blends = |edges: &[[u32; 2]]| -> Vec<R> {
+            edges
+                .iter()
+                .map(|&[i, j]| {
+                    let noise = edge_noise(options.seed, i, j);
+                    let blend = options.rest_blend * (1.0 + options.rest_imperfection * noise);
+                    R::splat(blend.clamp(0.0, 1.0))
+                })
+                .collect()
+        };
+        Self {
+            patches: patches.to_vec(),
+            integrator: options.integrator,
+            has_pressure: patches.iter().any(|&p| all[p].material.pressure > 0.0),
+            origin,
+            mass: per_lane(&|p| p.material.mass),
+            magnet: Magnet {
+                stiffness: per_lane(&|p| p.material.magnet_stiffness()),
+                damping: per_lane(&|p| p.material.magnet_damping()),
+            },
+            damping: per_lane(&|p| p.material.damping),
+            stretch: [
+                per_lane(&|p| p.material.stretch_stiffness()),
+                per_lane(&|p| p.material.compression_stiffness()),
+            ],
+            stretch_damping_time: per_lane(&|p| p.material.stretch_damping_time()),
+            shear: per_lane(&|p| p.material.shear_stiffness()),
+            bend: per_lane(&|p| p.material.bend_stiffness()),
+            bend_dropoff: per_lane(&|p| p.material.bend_angle_dropoff),
+            pressure: per_lane(&|p| p.material.pressure_stiffness(n, area(p))),
+            inv_edge_squared: R::splat(1.0) / (mean_edge * mean_edge).max(R::splat(1e-12)),
+            // A grid without edges has no measure to hold displacements to.
+            clamp_squared: R::select_less(
+                R::splat(0.0),
+                mean_edge,
+                mean_edge * mean_edge * R::splat(0.25),
+                R::splat(FARTHEST * FARTHEST),
+            ),
+            air: Air {
+                density: R::splat(options.air_density),
+                drag: R::splat(options.drag),
+                lift: R::splat(options.lift),
+            },
+            inv_air_mass: per_lane(&|p| {
+                n as f64 / (options.areal_density * p.material.mass * area(p)).max(1e-12)
+            }),
+            anchor_stiffness,
+            anchors,
+            pairs: GroupPairs::default(),
+            edge_lengths: RestLengths::new(&rest, &lists.edges, blends(&lists.edges)),
+            diagonal_lengths: RestLengths::new(&rest, &lists.diagonals, blends(&lists.diagonals)),
+            lists,
+            displacements: zero.clone(),
+            previous_displacements: zero.clone(),
+            velocities: zero.clone(),
+            previous_velocities: zero.clone(),
+            target_steps: zero.clone(),
+            starts: rest.clone(),
+            chords: zero.clone(),
+            start_slopes: zero.clone(),
+            end_slopes: zero.clone(),
+            end_velocities: zero.clone(),
+            end_positions: (0..patches.len())
+                .map(|lane| all[patches[lane]].rest.clone())
+                .collect(),
+            targets: rest.clone(),
+            ends: rest,
+            solution: zero.clone(),
+            past: zero.clone(),
+            resting: zero.clone(),
+            inv_masses: vec![R::splat(0.0); n],
+            accelerations: zero.clone(),
+            gradient: zero,
+            masses_h_e: R::splat(-1.0),
+            h_e: R::splat(0.0),
+            clamped: R::splat(0.0),
+            drive: R::splat(0.0),
+            mismatch: R::splat(0.0),
+            lane_states: vec![LaneState::default(); R::LANES],
+        }
+    }
+}
+
+impl ClothPatch {
+    /// Nodes and strength of each set of anchors, in order.
+    pub(crate) fn anchor_sets(&self) -> impl Iterator<Item = (&[u32], f64)> {
+        self.attachments.iter().filter_map(|a| match a {
+            ClothAttachment::Anchors { nodes, strength } => Some((nodes.as_slice(), *strength)),
+            _ => None,
+        })
+    }
+}
+
+/// A position relative to a centre.
+pub(super) fn relative(p: &Point3<f32>, center: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| f64::from(p[axis]) - center[axis])
+}
+
+/// Mean length of the grid's edges. [mm]
+fn mean_edge<R: Real>(edges: &[[u32; 2]], positions: &[Vec3<R>]) -> R {
+    let mut sum = R::splat(0.0);
+    for &[i, j] in edges {
+        sum += edge_length(positions[i as usize], positions[j as usize]);
+    }
+    sum / R::splat(edges.len().max(1) as f64)
+}
+
+/// Area of a patch at rest. [mm^2]
+fn rest_area(patch: &ClothPatch) -> f64 {
+    let at = |i: u32| patch.rest[i as usize].map(f64::from);
+    patch
+        .shape
+        .quads()
+        .iter()
+        .map(|&[a, b, c, d]| (at(c) - at(a)).cross(&(at(d) - at(b))).norm() / 2.0)
+        .sum()
+}
+
+/// Noise in [-1, 1] for the edge of two nodes, the same in every patch (SplitMix64's
+/// finalizer).
+fn edge_noise(seed: u64, i: u32, j: u32) -> f64 {
+    let edge = (u64::from(i) << 32) | u64::from(j);
+    let mut z = seed
+        .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        .wrapping_add((edge + 1).wrapping_mul(0xBF58_476D_1CE4_E5B9));
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
