@@ -128,13 +128,6 @@ fn check_against_truth(pose: &Similarity3<f64>) {
         .collect();
     let (median, p95) = (percentile(&mut errors, 0.5), percentile(&mut errors, 0.95));
     let report = &found.report;
-    println!(
-        "true vertex error: median {median:.3}, 95 % {p95:.3} mm; surface: median {:.3}, 95 % {:.3}, folded {}, confidence {:.2}",
-        report.template_to_face.median,
-        report.template_to_face.p95,
-        report.folded_triangles,
-        report.confidence
-    );
     assert!(median < 0.6 && p95 < 1.8, "median {median}, 95 % {p95}");
     assert!(report.template_to_face.median < 0.2 && report.template_to_face.p95 < 0.8);
     assert_eq!(report.folded_triangles, 0);
@@ -225,10 +218,6 @@ fn the_template_maps_to_itself_with_lips_and_lids_by_side_and_its_parts_by_body(
 fn the_demo_face_is_registered_within_a_millimetre() {
     let found = run(&template::demo_face());
     let report = &found.report;
-    println!(
-        "demo face: {}",
-        serde_json::to_string(report).expect("json")
-    );
     assert!(report.template_to_face.median < 0.2 && report.template_to_face.p95 < 0.8);
     assert_eq!(report.folded_triangles, 0);
     assert!(report.confidence > 0.4);
@@ -412,9 +401,8 @@ fn real_faces_are_registered_where_they_are_at_hand() {
             .join(format!("{name}.obj"));
         let face = fabrig_core::mesh::io::read_mesh(&path).expect("a mesh");
         let report = run(&face).report;
-        println!("{name}: {}", serde_json::to_string(&report).expect("json"));
-        assert!(report.template_to_face.median < 0.2, "{name}");
-        assert!(report.template_to_face.p95 < p95, "{name}");
+        assert!(report.template_to_face.median < 0.2, "{name}: {report:?}");
+        assert!(report.template_to_face.p95 < p95, "{name}: {report:?}");
         assert!(report.confidence > 0.3, "{name}");
         assert!(report.folded_triangles <= 2, "{name}");
         if let Some(mouth) = mouth {

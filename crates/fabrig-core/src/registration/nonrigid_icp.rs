@@ -3,9 +3,11 @@
 //!
 //! Unknowns of node i, for each output coordinate: a row of A_i and t_i. With rest places g,
 //!
+//! ```text
 //! E = sum_i w_i |g_i + t_i - u_i|^2
 //!   + alpha sum_ij ( |A_i e_ij + t_i - t_j - e_ij|^2 + |A_j e_ji + t_j - t_i - e_ji|^2
 //!                  + l_ij^2 |A_i - A_j|^2 ),   e_ij = g_j - g_i
+//! ```
 //!
 //! At rest every A_i is the identity. Any global affine map costs nothing, so size and
 //! proportions adapt before detail does.

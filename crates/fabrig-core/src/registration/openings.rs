@@ -187,12 +187,12 @@ fn weigh(column: &mut Column) {
         let step = depth(row + 1) - depth(row);
         if step < -JUMP_MM && start.is_none() {
             start = Some(row + 1);
-        } else if step > JUMP_MM {
-            if let Some(first) = start.take() {
-                let skin = depth(first - 1).min(depth(row + 1));
-                for r in first..=row {
-                    behind[r] = (skin - depth(r)).max(0.0);
-                }
+        } else if step > JUMP_MM
+            && let Some(first) = start.take()
+        {
+            let skin = depth(first - 1).min(depth(row + 1));
+            for r in first..=row {
+                behind[r] = (skin - depth(r)).max(0.0);
             }
         }
     }

@@ -2,8 +2,10 @@
 //!
 //! A displacement d of every vertex from the coarse result x minimizes
 //!
+//! ```text
 //! E = sum_i w_i A_i |x_i + d_i - u_i|^2 + sum_k w_k A_k |sum_c b_c (x_c + d_c) - q_k|^2
 //!   + l^4 d' L M^-1 L d + (l/8)^2 d' L d
+//! ```
 //!
 //! with A the areas, u_i the face's closest place to vertex i, q_k vertices of the face and b
 //! their closest places on the template, L the cotangent Laplacian and M its lumped mass. The

@@ -260,14 +260,14 @@ fn check(options: &RegistrationOptions) -> Result<(), RegistrationError> {
             expected: "a number from 0 to 1",
         });
     }
-    if let Some(value) = options.unit_mm {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(RegistrationError::BadOption {
-                name: "unit_mm",
-                value,
-                expected: "a positive number of millimetres",
-            });
-        }
+    if let Some(value) = options.unit_mm
+        && !(value.is_finite() && value > 0.0)
+    {
+        return Err(RegistrationError::BadOption {
+            name: "unit_mm",
+            value,
+            expected: "a positive number of millimetres",
+        });
     }
     Ok(())
 }

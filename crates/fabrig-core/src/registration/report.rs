@@ -137,11 +137,10 @@ pub(super) fn measure(
     let (mut covered, mut total) = (0.0, 0.0);
     for v in (0..registered.len()).filter(|&v| model.roles[v] == Role::Face) {
         total += areas[v];
-        if let Some(m) = target.matching(&registered[v], &normals[v], COUNTERPART_MM, cos_limit) {
-            if !m.is_on_boundary {
-                covered += areas[v];
-                forth.push(m.place.distance);
-            }
+        let mate = target.matching(&registered[v], &normals[v], COUNTERPART_MM, cos_limit);
+        if let Some(m) = mate.filter(|m| !m.is_on_boundary) {
+            covered += areas[v];
+            forth.push(m.place.distance);
         }
     }
     let surface = Surface::new(registered, &model.triangles)?;
