@@ -41,7 +41,7 @@ fn there_are_29_linear_muscles_3_sphincters_and_12_fat_pads_with_19380_nodes() {
 }
 
 #[test]
-fn the_same_layout_gives_50k_and_200k_nodes() {
+fn the_same_layout_gives_2k_50k_and_200k_nodes() {
     for (resolution, expected) in [(Resolution::FINE, 50_080), (Resolution::FINEST, 200_320)] {
         let charts = charts(human(), resolution).expect("the default layout");
         let count: usize = charts.iter().map(|c| c.nodes.len()).sum();
@@ -285,7 +285,7 @@ fn skin_that_moves_has_a_patch_under_it() {
         }
         let share = shape.covered_count as f64 / shape.moving_count as f64;
         assert!(
-            share >= 0.90,
+            share >= 0.98,
             "{}: {} of {} moving vertices covered, vertex {} is {:.1} mm away",
             shape.shape,
             shape.covered_count,

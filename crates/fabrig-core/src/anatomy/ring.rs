@@ -3,7 +3,7 @@
 use super::error::AnatomyError;
 use super::layout::PatchText;
 use super::margin::Margin;
-use super::patch::{GridShape, SurfaceNode};
+use super::patch::{GridShape, Resolution, SurfaceNode};
 use super::places::{Places, SNAP_REACH, off_skin};
 use super::sheet::depth_at;
 use super::spline::{polyline_at, polyline_length, sample_by_length};
@@ -13,8 +13,10 @@ use crate::mesh::SurfacePoint;
 /// How often a stretch between two rings is halved, each middle put on the skin.
 const HALVINGS: u32 = 5;
 
-/// Rounds of evening out between neighbours; the margin and the outermost ring stay.
-const EVENING_ROUNDS: usize = 4;
+/// Rounds of evening out between neighbours at standard resolution; the margin and the
+/// outermost ring stay. It spreads with the square root of the rounds: at other resolutions
+/// there are as many as spread equally far.
+const EVENING_ROUNDS: f64 = 4.0;
 
 /// First step from the margin, relative to an even step: rows are closer where lips and lids
 /// move most.
@@ -89,7 +91,8 @@ pub(super) fn chart_ring(
         }
     }
     let mut points = complete(&columns, text.is_pair);
-    for _ in 0..EVENING_ROUNDS {
+    let finer = f64::from(grid.u_count) / f64::from(Resolution::STANDARD.ring[0]);
+    for _ in 0..(EVENING_ROUNDS * finer * finer).round() as usize {
         points = even_out(&points);
         for u in 0..u_count {
             let stop = Stop::of_column(u, u_count, text.is_pair);
