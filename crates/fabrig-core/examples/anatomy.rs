@@ -18,7 +18,7 @@ use fabrig_core::template::{Template, human};
 use fabrig_core::{Point, Vector};
 
 /// More than the deepest patch, less than what would bring hidden patches to light. [mm]
-const SHIFT: f64 = 13.0;
+const SHIFT: f64 = 20.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: anatomy FOLDER")?);

@@ -14,8 +14,7 @@ use crate::mesh::SurfacePoint;
 const HALVINGS: u32 = 5;
 
 /// Rounds of evening out between neighbours at standard resolution; the margin and the
-/// outermost ring stay. It spreads with the square root of the rounds: at other resolutions
-/// there are as many as spread equally far.
+/// outermost ring stay. Coarser grids have fewer, so that corners are not rounded off.
 const EVENING_ROUNDS: f64 = 4.0;
 
 /// First step from the margin, relative to an even step: rows are closer where lips and lids
@@ -91,7 +90,7 @@ pub(super) fn chart_ring(
         }
     }
     let mut points = complete(&columns, text.is_pair);
-    let finer = f64::from(grid.u_count) / f64::from(Resolution::STANDARD.ring[0]);
+    let finer = (f64::from(grid.u_count) / f64::from(Resolution::STANDARD.ring[0])).min(1.0);
     for _ in 0..(EVENING_ROUNDS * finer * finer).round() as usize {
         points = even_out(&points);
         for u in 0..u_count {
