@@ -24,6 +24,9 @@ const ENERGY_TOLERANCE: f64 = 4.0;
 /// Energy may exceed the bound by this factor before a patch is frozen.
 const FREEZE_TOLERANCE: f64 = 1e3;
 
+/// A patch that has fallen back in this many frames on end is frozen.
+const LONGEST_TROUBLE: u32 = 30;
+
 /// Frames of backward Euler after a fall-back.
 const EULER_FRAMES: u32 = 2;
 
@@ -38,6 +41,10 @@ pub struct Cloth {
     monitors: Vec<Vec<Monitor>>,
     positions: Vec<Vec<Point3<f32>>>,
     energies: Vec<Energies>,
+    /// Energy that each patch may have, and at the end the whole, from what was put in so far.
+    ceilings: Vec<f64>,
+    /// For how many frames on end each patch has fallen back.
+    troubled_frames: Vec<u32>,
     previous_h: f64,
     fields: Fields,
 }
@@ -130,6 +137,8 @@ impl Cloth {
             options: *options,
             positions: patches.iter().map(|p| p.rest.clone()).collect(),
             energies: vec![Energies::default(); patches.len()],
+            ceilings: vec![0.0; patches.len() + 1],
+            troubled_frames: vec![0; patches.len()],
             monitors: vec![Vec::new(); groups.len()],
             ports: [empty_ports.clone(), empty_ports],
             has_pairs,
@@ -168,6 +177,8 @@ impl Cloth {
         self.fields = Fields::NONE;
         self.previous_h = 0.0;
         self.energies.fill(Energies::default());
+        self.ceilings.fill(0.0);
+        self.troubled_frames.fill(0);
         self.write_positions();
         Ok(())
     }
@@ -280,28 +291,49 @@ impl Cloth {
         let mut sum = Energies::default();
         // Pairs hand energy from patch to patch; then only the whole is bounded.
         let mut whole = Monitor::default();
+        let mut whole_energy = 0.0;
         for m in self.monitors.iter().flatten() {
             whole.before += m.before;
             whole.drive += m.drive;
             whole.mismatch += m.mismatch;
+            whole_energy += m.energies.total();
         }
+        let last = self.ceilings.len() - 1;
+        let whole_bound = energy_bound(&whole, whole_energy, &mut self.ceilings[last]);
         for (group, monitors) in self.groups.iter_mut().zip(&self.monitors) {
             for (lane, m) in monitors.iter().enumerate() {
                 let patch = group.patches()[lane];
                 counters.clamped_displacements += m.clamped;
-                let bound = energy_bound(if self.has_pairs { &whole } else { m });
                 let energy = m.energies.total();
+                let own_bound = energy_bound(m, energy, &mut self.ceilings[patch]);
+                let bound = if self.has_pairs {
+                    whole_bound
+                } else {
+                    own_bound
+                };
                 self.energies[patch] = m.energies;
-                if !m.is_sound || energy > FREEZE_TOLERANCE * bound {
+                let trouble = &mut self.troubled_frames[patch];
+                *trouble = if energy > ENERGY_TOLERANCE * bound {
+                    *trouble + 1
+                } else {
+                    0
+                };
+                let is_lost = energy > FREEZE_TOLERANCE * bound || *trouble > LONGEST_TROUBLE;
+                if !m.is_sound || is_lost {
                     group.freeze(lane);
                     counters.frozen_patches += 1;
                     self.energies[patch] = Energies::default();
-                } else if energy > ENERGY_TOLERANCE * bound {
+                    self.ceilings[patch] = 0.0;
+                    *trouble = 0;
+                } else if *trouble > 0 {
                     group.fall_back(lane, EULER_FRAMES);
                     counters.euler_fallbacks += 1;
                 }
                 sum += self.energies[patch];
             }
+        }
+        if !self.ceilings[last].is_finite() {
+            self.ceilings[last] = sum.total();
         }
         (counters, sum)
     }
@@ -315,12 +347,16 @@ impl Cloth {
     }
 }
 
-/// What energy a patch may have after a frame: what it had and what moving targets and fields
-/// gave, as amplitudes, with what rest lengths and anchors hold against the targets. The floor
+/// What energy a patch may have after a frame: what it had, or might have had, and what moving
+/// targets and fields gave, as amplitudes, with what rest lengths and anchors hold against the
+/// targets. Without input the ceiling never rises, however slowly energy creeps up. The floor
 /// is the energy of a thousandth of a millimetre at 10 Hz in a thousand nodes.
-fn energy_bound(m: &Monitor) -> f64 {
-    let amplitude = m.before.max(0.0).sqrt() + m.drive;
-    amplitude * amplitude + 2.0 * m.mismatch + 1.0
+fn energy_bound(m: &Monitor, energy: f64, ceiling: &mut f64) -> f64 {
+    let before = ceiling.min(ENERGY_TOLERANCE * m.before).max(0.0);
+    let amplitude = before.sqrt() + m.drive;
+    let bound = amplitude * amplitude + 2.0 * m.mismatch + 1.0;
+    *ceiling = energy.min(bound).max(amplitude * amplitude);
+    bound
 }
 
 /// Runs all substeps with the groups in step, as pairs couple them.
