@@ -50,6 +50,13 @@ fn the_demo_is_recorded_whole() {
         (Some(44), Some(52))
     );
     assert_eq!(rig["nodes"], 19_380);
+    let parts = rig["parts"].as_array().unwrap();
+    for name in ["eye_l", "eye_r", "upper_teeth", "lower_teeth", "tongue"] {
+        assert!(
+            parts.iter().any(|part| part == name),
+            "no {name} in {parts:?}"
+        );
+    }
 
     // The same rig through a short take, twice.
     std::fs::write(

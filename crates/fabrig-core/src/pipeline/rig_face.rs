@@ -63,7 +63,8 @@ pub fn rig_face(
         .skin
         .with_positions(registration.positions.clone())?;
     let on_template = FaceOnTemplate::from_registration(face, &registration)?;
-    let rig = build(&on_template, template, &options.rig)?;
+    let mut rig = build(&on_template, template, &options.rig)?;
+    name_parts_by_groups(&mut rig);
     let mut report = registration.report;
     report.times.push(StageTime {
         stage: "build".to_owned(),
@@ -74,4 +75,39 @@ pub fn rig_face(
         normalized,
         report,
     })
+}
+
+/// Loose pieces that registration could only tell to move with skull or jaw take the name that
+/// the file gives them (`upper_teeth`, `tongue`), where one group holds the whole piece.
+fn name_parts_by_groups(rig: &mut Rig) {
+    let mut owner = vec![None; rig.face.vertex_count()];
+    for (part, piece) in rig.parts.iter().enumerate() {
+        for &vertex in &piece.vertices {
+            owner[vertex as usize] = Some(part);
+        }
+    }
+    // For each part the one group that its faces are in, `Err` once there are several.
+    let mut groups: Vec<Option<Result<usize, ()>>> = vec![None; rig.parts.len()];
+    for (index, group) in rig.face.groups().iter().enumerate() {
+        for face in group.faces.clone() {
+            let Some(part) = owner[rig.face.polygons().face(face)[0] as usize] else {
+                continue;
+            };
+            groups[part] = match groups[part] {
+                None => Some(Ok(index)),
+                Some(Ok(same)) if same == index => Some(Ok(index)),
+                _ => Some(Err(())),
+            };
+        }
+    }
+    for part in 0..rig.parts.len() {
+        let Some(Ok(group)) = groups[part] else {
+            continue;
+        };
+        let name = rig.face.groups()[group].name.clone();
+        let is_taken = rig.parts.iter().any(|other| other.name == name);
+        if rig.parts[part].name.contains("rigid") && !is_taken {
+            rig.parts[part].name = name;
+        }
+    }
 }
