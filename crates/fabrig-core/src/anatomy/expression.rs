@@ -47,6 +47,9 @@ impl PointExpression {
             }
             expression.terms.push((weight, name.to_owned()));
         }
+        if expression.terms.is_empty() {
+            return Err("it names no point".to_owned());
+        }
         let sum: f64 = expression.terms.iter().map(|t| t.0).sum();
         if (sum - 1.0).abs() > 1e-9 {
             return Err(format!("weights sum to {sum}, not 1"));
@@ -84,7 +87,7 @@ mod tests {
             ("a + (1, 2)", "3 numbers"),
             ("a + (1, 2, x)", "`x`"),
             ("a + (1, 2, 3", "closing"),
-            ("(1, 2, 3)", "sum to 0"),
+            ("(1, 2, 3)", "no point"),
             ("a b c", "neither"),
             ("", "neither"),
             ("1 2", "not a name"),

@@ -120,7 +120,7 @@ fn complete_across_mid_line(
         }
         place.point.x = 0.0;
     }
-    let images: Vec<Vec<SurfacePoint>> = ribs[..last].iter().rev().map(|rib| rib.clone()).collect();
+    let images: Vec<Vec<SurfacePoint>> = ribs[..last].iter().rev().cloned().collect();
     for mut image in images {
         for place in &mut image {
             place.point.x = -place.point.x;
