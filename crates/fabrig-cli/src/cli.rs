@@ -47,7 +47,7 @@ pub(crate) enum Unit {
 }
 
 impl Unit {
-    /// Its length. [mm]
+    /// Its length. (mm)
     pub(crate) fn millimetres(self) -> f64 {
         match self {
             Self::Mm => 1.0,

@@ -1,5 +1,9 @@
 //! Bad input of every kind gives one line on standard error that says what, where and what
 //! next, exit code 1 (failed) or 2 (wrong usage), and leaves no file behind.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 use std::path::{Path, PathBuf};
 

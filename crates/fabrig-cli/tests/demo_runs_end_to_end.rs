@@ -1,5 +1,9 @@
 //! The bundled face and take become a recording with nothing but the binary; equal inputs give
 //! equal bytes; a rig that was cut is refused.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 use assert_cmd::Command;
 use serde_json::Value;

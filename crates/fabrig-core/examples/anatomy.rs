@@ -17,7 +17,7 @@ use fabrig_core::render::{FaceLook, Label, Picture, Rgb, View, patch_layer, temp
 use fabrig_core::template::{Template, human};
 use fabrig_core::{Point, Vector};
 
-/// More than the deepest patch, less than what would bring hidden patches to light. [mm]
+/// More than the deepest patch, less than what would bring hidden patches to light. (mm)
 const SHIFT: f64 = 20.0;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release -p fabrig-core --example cloth_pareto`; set `RAYON_NUM_THREADS=1` for
 //! one thread.
+#![allow(clippy::print_stdout, reason = "printing is what this program does")]
 
 use fabrig_core::cloth::bench::{BenchScene, difference, run};
 use fabrig_core::cloth::{ClothOptions, Integrator, Precision};

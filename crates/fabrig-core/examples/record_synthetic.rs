@@ -141,7 +141,7 @@ fn grid_triangles(side: u32) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// A strip in front of the ball's centre that bulges with time. [mm]
+/// A strip in front of the ball's centre that bulges with time. (mm)
 fn patch(side: u32, index: f32, t: f32) -> Vec<Point3<f32>> {
     let mut points = Vec::new();
     for v in 0..side {

@@ -38,7 +38,7 @@ pub mod transfer;
 
 pub use error::Error;
 
-/// A position, double precision. [mm] unless stated.
+/// A position, double precision. (mm) unless stated.
 pub type Point = nalgebra::Point3<f64>;
-/// A displacement or direction, double precision. [mm] unless stated.
+/// A displacement or direction, double precision. (mm) unless stated.
 pub type Vector = nalgebra::Vector3<f64>;

@@ -46,7 +46,7 @@ fn info() -> RecordingInfo {
     }
 }
 
-/// A waving sheet at depth z. [mm]
+/// A waving sheet at depth z. (mm)
 fn sheet(z: f32, k: u64) -> Vec<Point3<f32>> {
     (0..SIDE * SIDE)
         .map(|i| {

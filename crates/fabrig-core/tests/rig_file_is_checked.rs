@@ -1,5 +1,9 @@
 //! A rig file comes back as it was written; one that is cut, damaged, of another version or
 //! something else is refused with an error that says so.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 mod faces;
 

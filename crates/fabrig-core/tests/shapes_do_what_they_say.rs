@@ -1,6 +1,10 @@
 //! Each of the 52 shapes at weight 1 does on the demo face what its name says, in millimetres
 //! on named points of its own skin; left shapes leave the right half still, and left and right
 //! mirror each other.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 mod faces;
 
@@ -69,20 +73,20 @@ fn vertex(landmark: &str) -> usize {
 }
 
 impl Posed {
-    /// Motion of a landmark. [mm]
+    /// Motion of a landmark. (mm)
     fn motion(&self, landmark: &str) -> Vector {
         let v = vertex(landmark);
         (self.now[v] - self.rest[v]).cast()
     }
 
-    /// Distance of two landmarks now, and at rest. [mm]
+    /// Distance of two landmarks now, and at rest. (mm)
     fn distances(&self, a: &str, b: &str) -> (f64, f64) {
         let (a, b) = (vertex(a), vertex(b));
         let of = |p: &[nalgebra::Point3<f32>]| f64::from((p[a] - p[b]).norm());
         (of(&self.now), of(&self.rest))
     }
 
-    /// Largest motion of any vertex. [mm]
+    /// Largest motion of any vertex. (mm)
     fn largest(&self) -> f64 {
         let motions = self.rest.iter().zip(&self.now);
         motions
@@ -91,7 +95,7 @@ impl Posed {
     }
 
     /// Height between the lids over the middle of an eye, now and at rest; negative where they
-    /// overlap. [mm]
+    /// overlap. (mm)
     fn aperture(&self, side: &str) -> (f64, f64) {
         let template = template::human();
         let demo = faces::demo();
@@ -117,7 +121,7 @@ impl Posed {
     }
 }
 
-/// How far the template's own shape moves a landmark. [mm]
+/// How far the template's own shape moves a landmark. (mm)
 fn drawn_motion(shape: &str, landmark: &str) -> f64 {
     let template = template::human();
     let shape = &template.shapes[template.shape_index(shape).unwrap()];

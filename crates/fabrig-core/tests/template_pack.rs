@@ -12,7 +12,7 @@ fn at(name: &str) -> Point {
         .unwrap_or_else(|| panic!("landmark {name}"))
 }
 
-/// Movement of a landmark under a shape at weight 1. [mm]
+/// Movement of a landmark under a shape at weight 1. (mm)
 fn moved(shape: &str, landmark: &str) -> Vector {
     let template = human();
     let vertex = template.landmarks[landmark];

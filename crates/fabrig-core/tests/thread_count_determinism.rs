@@ -1,4 +1,8 @@
 //! Rigs and simulations have the same bits for 1, 2 and 8 threads.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 mod faces;
 

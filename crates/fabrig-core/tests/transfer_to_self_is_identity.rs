@@ -1,5 +1,9 @@
 //! The template rigged as a user's face gives back its own whole-face shapes: muscle shapes,
 //! patches and skin weights lose little on the way. `fabrig bench chain` prints the table.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should fail there"
+)]
 
 mod faces;
 
@@ -9,7 +13,7 @@ use fabrig_core::scene::{Scene, chain_loss};
 use fabrig_core::template;
 
 /// Shapes that do not reach the bounds over all moved vertices, because of inner skin deep in
-/// the mouth: (name, mean, 95 %). [mm]
+/// the mouth: (name, mean, 95 %). (mm)
 const KNOWN: [(&str, f64, f64); 2] = [("mouthFunnel", 0.35, 1.4), ("cheekPuff", 0.3, 1.2)];
 
 #[test]

@@ -19,7 +19,7 @@ pub(crate) struct PyClip {
 
 #[pymethods]
 impl PyClip {
-    /// From times [s] of shape (F,), names of C shapes, and weights of shape (F, C) in [0, 1].
+    /// From times (s) of shape (F,), names of C shapes, and weights of shape (F, C) in [0, 1].
     #[new]
     fn new(
         times: &Bound<'_, PyAny>,
@@ -45,7 +45,7 @@ impl PyClip {
         Ok(Self { inner })
     }
 
-    /// Times of the frames [s], shape (F,).
+    /// Times of the frames (s), shape (F,).
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.inner.times().to_vec().into_pyarray(py)
@@ -68,7 +68,7 @@ impl PyClip {
         .into_pyarray(py)
     }
 
-    /// Time from the first to the last frame [s].
+    /// Time from the first to the last frame (s).
     #[getter]
     fn duration(&self) -> f64 {
         self.inner.duration()
@@ -86,7 +86,7 @@ impl PyClip {
         arrays::to_python(py, self.inner.notes())
     }
 
-    /// Weights at a time [s] between the frames, shape (C,).
+    /// Weights at a time (s) between the frames, shape (C,).
     fn sample<'py>(&self, py: Python<'py>, time: f64) -> Bound<'py, PyArray1<f32>> {
         self.inner.sample(time).weights.into_pyarray(py)
     }

@@ -59,7 +59,7 @@ pub(crate) fn rig(
 /// Simulates a rig through a take and records it to an MCAP file; returns a report.
 ///
 /// - `fps`: frames a second; the take's own by default
-/// - `gravity` [mm/s^2] and `wind` [mm/s]: three numbers, world axes, +Y up
+/// - `gravity` (mm/s^2) and `wind` (mm/s): three numbers, world axes, +Y up
 /// - `progress`: called with ("simulate", share); raising or Ctrl-C ends the recording there,
 ///   whole and readable
 #[pyfunction]
@@ -78,10 +78,10 @@ pub(crate) fn animate<'py>(
     dynamics: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    if let Some(fps) = fps {
-        if !(fps.is_finite() && fps > 0.0) {
-            return Err(input(format!("fps: {fps} is not a frame rate")));
-        }
+    if let Some(fps) = fps
+        && !(fps.is_finite() && fps > 0.0)
+    {
+        return Err(input(format!("fps: {fps} is not a frame rate")));
     }
     let scene = scene(gravity.as_ref(), wind.as_ref(), substeps, dynamics)?;
     let options = AnimateOptions {

@@ -89,7 +89,7 @@ impl PySimulation {
         arrays::to_python(py, &report.map_err(to_py)?)
     }
 
-    /// Time on the clip's axis [s].
+    /// Time on the clip's axis (s).
     #[getter]
     fn time(&self) -> f64 {
         self.inner.time()
@@ -128,7 +128,7 @@ impl PySimulation {
         self.inner.pose().weights.clone().into_pyarray(py)
     }
 
-    /// From the head frame to the world [mm], shape (4, 4).
+    /// From the head frame to the world (mm), shape (4, 4).
     #[getter]
     fn head<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let matrix = self.inner.head().to_homogeneous();

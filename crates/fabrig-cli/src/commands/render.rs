@@ -45,7 +45,7 @@ pub(crate) fn run(console: &Console, args: &RenderArgs) -> Result<Outcome> {
         name.as_ref(),
         extension(&args.input).as_deref().and_then(|e| e.to_str()),
     ) {
-        (_, Some("mcap")) => return render_recording(console, args, &views, is_gif),
+        (_, Some("mcap")) => render_recording(console, args, &views, is_gif),
         _ if is_gif => bail!(
             "{}: a GIF is made from a recording (.mcap)",
             args.output.display()

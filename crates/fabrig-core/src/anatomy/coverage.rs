@@ -15,7 +15,7 @@ pub struct ShapeCoverage {
     pub moving_count: usize,
     /// Those of them with a patch node under the skin within reach.
     pub covered_count: usize,
-    /// Greatest distance from a moving vertex to the nearest place with a patch under it. [mm]
+    /// Greatest distance from a moving vertex to the nearest place with a patch under it. (mm)
     pub greatest_distance: f64,
     /// The vertex with that distance.
     pub farthest_vertex: u32,
@@ -27,8 +27,8 @@ const HIDDEN: [&str; 4] = ["mouth_interior", "socket", "nostril", "ear"];
 /// Measures, shape by shape, which moving skin has a patch under it: skin moves only with
 /// patches.
 ///
-/// - `threshold`: what counts as moving [mm]; `reach`: how near a node must be, measured on
-///   the skin above it [mm]
+/// - `threshold`: what counts as moving (mm); `reach`: how near a node must be, measured on
+///   the skin above it (mm)
 pub fn coverage(
     template: &Template,
     charts: &[PatchChart],

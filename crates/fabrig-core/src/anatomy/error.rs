@@ -103,13 +103,13 @@ pub enum AnatomyError {
     OffSkin {
         /// Patch.
         patch: String,
-        /// How far was searched. [mm]
+        /// How far was searched. (mm)
         reach: f64,
-        /// Where. [mm]
+        /// Where. (mm)
         x: f64,
-        /// Where. [mm]
+        /// Where. (mm)
         y: f64,
-        /// Where. [mm]
+        /// Where. (mm)
         z: f64,
     },
     /// A margin is not one closed loop through both corners.
@@ -155,9 +155,9 @@ pub enum AnatomyError {
         u: u32,
         /// Row.
         v: u32,
-        /// Distance found. [mm]
+        /// Distance found. (mm)
         distance: f64,
-        /// Least distance. [mm]
+        /// Least distance. (mm)
         limit: f64,
     },
     /// An attachment reaches nothing.
@@ -172,9 +172,9 @@ pub enum AnatomyError {
         key: String,
         /// Patch that it should hold to.
         other: String,
-        /// How far was searched. [mm]
+        /// How far was searched. (mm)
         reach: f64,
-        /// Nearest distance. [mm]
+        /// Nearest distance. (mm)
         distance: f64,
     },
     /// A face does not have the template's vertices.

@@ -49,7 +49,7 @@ pub(super) struct PatchText {
     /// `#rrggbb`
     pub(super) color: String,
     /// Depth under the skin at equal steps along the fibres (linear muscle, fat pad) or from
-    /// the margin outwards (sphincter). [mm]
+    /// the margin outwards (sphincter). (mm)
     pub(super) depth: Vec<f64>,
     /// Curves along the fibres, from origin to insertion; u x v points outwards. Of a patch on
     /// the mid line, those on the left and, last, one on the mid line.
@@ -115,7 +115,7 @@ pub(super) struct HoldText {
     /// Part of the fibre length that is held, from that end.
     #[serde(default)]
     pub(super) share: f64,
-    /// Greatest distance between nodes held together. [mm]
+    /// Greatest distance between nodes held together. (mm)
     #[serde(default)]
     pub(super) reach: f64,
     /// Stiffness relative to stretch.

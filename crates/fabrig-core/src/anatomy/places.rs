@@ -10,7 +10,7 @@ use crate::mesh::SurfacePoint;
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
 
-/// How far from the skin an authored point may be. [mm]
+/// How far from the skin an authored point may be. (mm)
 pub(super) const SNAP_REACH: f64 = 25.0;
 
 /// The template's skin, which of its triangles patches may lie on, and named places.

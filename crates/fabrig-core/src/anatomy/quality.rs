@@ -71,7 +71,7 @@ pub(super) fn check_grid(skin: &SkinFrame, patch: &Patch) -> Result<(), AnatomyE
     Ok(())
 }
 
-/// Distances between neighbouring nodes of a grid. [mm]
+/// Distances between neighbouring nodes of a grid. (mm)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacing {
     /// Least distance.

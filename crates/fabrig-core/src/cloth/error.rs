@@ -143,9 +143,9 @@ pub enum ClothError {
     /// A frame of no, negative or infinite duration.
     #[error("dt is {dt} s, but must be above 0 and at most {limit} s")]
     TimeStep {
-        /// What was given. [s]
+        /// What was given. (s)
         dt: f64,
-        /// Longest allowed. [s]
+        /// Longest allowed. (s)
         limit: f64,
     },
 }

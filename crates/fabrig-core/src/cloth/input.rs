@@ -7,7 +7,7 @@ pub use crate::anatomy::GridShape;
 
 use super::materials::Material;
 
-/// Standing gravity: down at 9.81 m/s^2. [mm/s^2]
+/// Standing gravity: down at 9.81 m/s^2. (mm/s^2)
 pub const STANDING_GRAVITY: [f32; 3] = [0.0, -9810.0, 0.0];
 
 /// A patch of cloth: a grid of nodes, a material, and what it is attached to.
@@ -122,7 +122,7 @@ pub enum Precision {
 pub struct PatchMotion {
     /// Positions, one per node (or per anchor). [mm, head frame]
     pub positions: Vec<Point3<f32>>,
-    /// Velocities there, as many; or none, for motion straight to the positions. [mm/s]
+    /// Velocities there, as many; or none, for motion straight to the positions. (mm/s)
     pub velocities: Vec<Vector3<f32>>,
 }
 
@@ -139,11 +139,11 @@ impl PatchMotion {
 /// Motion of the head frame at the end of a frame, in its own axes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct HeadMotion {
-    /// Acceleration of the origin. [mm/s^2]
+    /// Acceleration of the origin. (mm/s^2)
     pub linear_acceleration: Vector3<f32>,
-    /// [rad/s]
+    /// (rad/s)
     pub angular_velocity: Vector3<f32>,
-    /// [rad/s^2]
+    /// (rad/s^2)
     pub angular_acceleration: Vector3<f32>,
 }
 
@@ -151,16 +151,16 @@ pub struct HeadMotion {
 /// there straight from what they were.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameInput<'a> {
-    /// Duration. [s]
+    /// Duration. (s)
     pub dt: f64,
     /// Motion of the targets, one per patch.
     pub targets: &'a [PatchMotion],
     /// Motion of the anchors, one per patch with the anchors of its attachments in their
     /// order; or none at all, when no anchor moves.
     pub anchors: &'a [PatchMotion],
-    /// Gravity in the head frame; none: as it stands. [mm/s^2]
+    /// Gravity in the head frame; none: as it stands. (mm/s^2)
     pub gravity: Option<Vector3<f32>>,
-    /// Velocity of the air in the head frame. [mm/s]
+    /// Velocity of the air in the head frame. (mm/s)
     pub wind: Vector3<f32>,
     /// Motion of the head frame.
     pub head: HeadMotion,

@@ -41,7 +41,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The calibrated unit of time of nCloth's numbers. [s]
+/// The calibrated unit of time of nCloth's numbers. (s)
 pub const TIME_UNIT: f64 = 1.0 / 87.0;
 
 /// Share of [`TIME_UNIT`]'s stiffness in a second difference.
@@ -64,7 +64,7 @@ pub struct Material {
     pub bend_resistance: f64,
     /// 0: every bend angle is resisted alike; towards 1: small ones less. In [0, 1).
     pub bend_angle_dropoff: f64,
-    /// Damping of velocity in the head frame. [1/s]
+    /// Damping of velocity in the head frame. (1/s)
     #[serde(alias = "overall_damping")]
     pub damping: f64,
     /// Damping of the edges' change of length.
@@ -72,7 +72,7 @@ pub struct Material {
     /// Resistance to change of the volume under the patch; 0 for muscles.
     #[serde(default)]
     pub pressure: f64,
-    /// Frequency at which a lone node swings about its target. [Hz]
+    /// Frequency at which a lone node swings about its target. (Hz)
     #[serde(default = "default_magnet_frequency")]
     pub magnet_frequency_hz: f64,
     /// Damping ratio of that swing relative to the target, 1 = critical.
@@ -135,7 +135,7 @@ impl Material {
         self.mass * rate * rate
     }
 
-    /// Damping rate of the magnet. [1/s]
+    /// Damping rate of the magnet. (1/s)
     pub fn magnet_damping(&self) -> f64 {
         2.0 * self.magnet_damping_ratio * std::f64::consts::TAU * self.magnet_frequency_hz
     }
@@ -171,7 +171,7 @@ impl Material {
         }
     }
 
-    /// Damping of an edge over its stiffness. [s]
+    /// Damping of an edge over its stiffness. (s)
     pub fn stretch_damping_time(&self) -> f64 {
         self.stretch_damping * TIME_UNIT
     }

@@ -253,7 +253,7 @@ impl Cloth {
         &self.energies[patch]
     }
 
-    /// Position [mm] and velocity [mm/s] of one node in the precision of the solver.
+    /// Position (mm) and velocity (mm/s) of one node in the precision of the solver.
     ///
     /// # Panics
     ///

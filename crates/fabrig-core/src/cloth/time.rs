@@ -8,12 +8,12 @@ const LARGEST_RATIO: f64 = 2.0;
 pub(crate) struct Stencil {
     /// g: how far the last change is carried on.
     pub(crate) history: f64,
-    /// Effective step. [s]
+    /// Effective step. (s)
     pub(crate) h_e: f64,
 }
 
 impl Stencil {
-    /// Backward Euler with step `h`. [s]
+    /// Backward Euler with step `h`. (s)
     pub(crate) fn euler(h: f64) -> Self {
         Self {
             history: 0.0,
@@ -21,7 +21,7 @@ impl Stencil {
         }
     }
 
-    /// BDF2 with step `h` after a step `previous` [s]; backward Euler where that is unstable.
+    /// BDF2 with step `h` after a step `previous` (s); backward Euler where that is unstable.
     pub(crate) fn bdf2(h: f64, previous: f64) -> Self {
         let r = h / previous;
         if !(r > 0.0 && r <= LARGEST_RATIO) {

@@ -6,15 +6,15 @@ use super::error::ClothError;
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, FrameInput, PatchMotion};
 use super::solver::PatchLayout;
 
-/// Largest coordinate. [mm]
+/// Largest coordinate. (mm)
 const FARTHEST: f32 = 1e6;
-/// Largest velocity. [mm/s]
+/// Largest velocity. (mm/s)
 const FASTEST: f32 = 1e9;
-/// Largest acceleration. [mm/s^2]
+/// Largest acceleration. (mm/s^2)
 const HARDEST: f32 = 1e9;
 /// Largest angular velocity or acceleration. [rad/s, rad/s^2]
 const FASTEST_TURN: f32 = 1e5;
-/// Longest frame. [s]
+/// Longest frame. (s)
 const LONGEST_FRAME: f64 = 10.0;
 
 /// Checks options.

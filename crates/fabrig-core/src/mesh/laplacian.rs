@@ -93,7 +93,7 @@ impl EdgeLaplacian {
     }
 }
 
-/// A third of the area of the triangles around each vertex, shape [vertex_count].
+/// A third of the area of the triangles around each vertex, shape `[vertex_count]`.
 pub fn vertex_areas(positions: &[Point], triangles: &[[u32; 3]]) -> Vec<f64> {
     let mut areas = vec![0.0; positions.len()];
     for t in triangles {

@@ -25,9 +25,9 @@ pub enum ClipError {
     TimeNotRising {
         /// The frame, from 0.
         frame: usize,
-        /// Its time. [s]
+        /// Its time. (s)
         time: f64,
-        /// The time of the frame before it. [s]
+        /// The time of the frame before it. (s)
         previous: f64,
     },
     /// A weight is NaN, infinite, or outside [0, 1].
@@ -76,7 +76,7 @@ pub struct ClipTracks {
     pub head: Vec<HeadPose>,
     /// Left eye, right eye.
     pub eyes: Vec<[EyeAngles; 2]>,
-    /// Velocity of the air in the world frame. [mm/s]
+    /// Velocity of the air in the world frame. (mm/s)
     pub wind: Vec<Vector>,
 }
 
@@ -95,20 +95,20 @@ pub struct Clip {
 pub struct Sample {
     /// One weight per channel, in [0, 1].
     pub weights: Vec<f32>,
-    /// Their rates of change. [1/s]
+    /// Their rates of change. (1/s)
     pub rates: Vec<f32>,
     /// Pose of the head; at rest where the take has none.
     pub head: HeadPose,
     /// Left eye, right eye, where the take has them.
     pub eyes: Option<[EyeAngles; 2]>,
-    /// Velocity of the air in the world frame. [mm/s]
+    /// Velocity of the air in the world frame. (mm/s)
     pub wind: Vector,
 }
 
 impl Clip {
     /// Checks and takes frames.
     ///
-    /// - `times`: rising. [s], shape [frame_count]
+    /// - `times`: rising. (s), shape `[frame_count]`
     /// - `channels`: names of shapes
     /// - `weights`: row-major, shape [frame_count, channel_count], in [0, 1]
     ///
@@ -225,7 +225,7 @@ impl Clip {
         self
     }
 
-    /// Times of the frames. [s], rising
+    /// Times of the frames. (s), rising
     pub fn times(&self) -> &[f64] {
         &self.times
     }
@@ -255,7 +255,7 @@ impl Clip {
         self.times.len()
     }
 
-    /// Time from the first to the last frame. [s]
+    /// Time from the first to the last frame. (s)
     pub fn duration(&self) -> f64 {
         self.times[self.times.len() - 1] - self.times[0]
     }
@@ -277,7 +277,7 @@ impl Clip {
             .collect()
     }
 
-    /// The values at `time` [s] on the clip's own time axis; before the first and after the
+    /// The values at `time` (s) on the clip's own time axis; before the first and after the
     /// last frame those hold.
     pub fn sample(&self, time: f64) -> Sample {
         let mut sample = Sample::default();

@@ -73,7 +73,7 @@ pub enum MotionError {
     BadFrameRate {
         /// Name of the take.
         name: String,
-        /// The rate. [1/s]
+        /// The rate. (1/s)
         found: f64,
     },
     /// A cell does not parse as what its column holds.
@@ -112,9 +112,9 @@ pub enum MotionError {
         name: String,
         /// The line of the file, from 1.
         row: usize,
-        /// Its time. [s]
+        /// Its time. (s)
         time: f64,
-        /// The time of the row before it. [s]
+        /// The time of the row before it. (s)
         previous: f64,
     },
     /// A line of a keyed take is wrong.

@@ -3,7 +3,7 @@
 //! ```text
 //! fabrig-keys 1
 //! fps 60                                   # frames per second of the clip; 60 if absent
-//! 0.5  mouthSmile=0                        # time [s], then channel=value ...
+//! 0.5  mouthSmile=0                        # time (s), then channel=value ...
 //! 0.9  mouthSmile=0.8 jawOpen=0.2          # a name without its side sets both sides
 //! 1.4  mouthSmile=0.8 hold                 # how the segment that ends here goes
 //! 2.0  mouthSmile=0 jawOpen=0 linear
@@ -190,13 +190,13 @@ impl KeyedTake {
     }
 
     fn add(&mut self, channel: Channel, key: Key) -> Result<(), String> {
-        if let Channel::Shape(shape) = channel {
-            if !(0.0..=1.0).contains(&key.value) {
-                return Err(format!(
-                    "{} = {}: weights lie in [0, 1]",
-                    ARKIT_SHAPES[shape], key.value
-                ));
-            }
+        if let Channel::Shape(shape) = channel
+            && !(0.0..=1.0).contains(&key.value)
+        {
+            return Err(format!(
+                "{} = {}: weights lie in [0, 1]",
+                ARKIT_SHAPES[shape], key.value
+            ));
         }
         let rest = Key {
             time: 0.0,

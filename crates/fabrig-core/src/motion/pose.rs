@@ -8,13 +8,13 @@ use crate::Vector;
 /// Pose of the head relative to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeadPose {
-    /// About +Y; positive turns the face to the character's left. [rad]
+    /// About +Y; positive turns the face to the character's left. (rad)
     pub yaw: f64,
-    /// About +X; positive looks down. [rad]
+    /// About +X; positive looks down. (rad)
     pub pitch: f64,
-    /// About +Z; positive leans the top of the head to the character's right. [rad]
+    /// About +Z; positive leans the top of the head to the character's right. (rad)
     pub roll: f64,
-    /// Where the head frame's origin has moved to. [mm]
+    /// Where the head frame's origin has moved to. (mm)
     pub translation: Vector,
 }
 
@@ -41,9 +41,9 @@ impl HeadPose {
 /// Where one eye looks, relative to straight ahead. Signs as in [`HeadPose`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct EyeAngles {
-    /// Positive looks to the character's left. [rad]
+    /// Positive looks to the character's left. (rad)
     pub yaw: f64,
-    /// Positive looks down. [rad]
+    /// Positive looks down. (rad)
     pub pitch: f64,
 }
 

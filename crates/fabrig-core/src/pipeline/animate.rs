@@ -22,7 +22,7 @@ use crate::scene::{FrameReport, Scene, Simulation};
 /// How a take is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnimateOptions {
-    /// Frames a second of the simulation; [`recording_rate`] of the take when `None`. [1/s]
+    /// Frames a second of the simulation; [`recording_rate`] of the take when `None`. (1/s)
     pub fps: Option<f64>,
     /// Name of the rig in the recording.
     pub rig_name: String,
@@ -61,23 +61,23 @@ pub struct AnimateReport {
     pub is_complete: bool,
     /// Frames recorded.
     pub frames: u64,
-    /// Frames a second of the simulation. [1/s]
+    /// Frames a second of the simulation. (1/s)
     pub fps: f64,
     /// Vertices of the user's mesh.
     pub vertex_count: usize,
     /// Nodes of all patches.
     pub node_count: usize,
-    /// Muscle shapes, cloth and skin of a frame. [ms]
+    /// Muscle shapes, cloth and skin of a frame. (ms)
     pub simulation_ms: TimeStatistics,
-    /// The cloth of a frame. [ms]
+    /// The cloth of a frame. (ms)
     pub cloth_ms: TimeStatistics,
-    /// Writing a frame. [ms]
+    /// Writing a frame. (ms)
     pub recording_ms: TimeStatistics,
-    /// Everything, by the clock on the wall. [s]
+    /// Everything, by the clock on the wall. (s)
     pub wall_secs: f64,
     /// Guards of the solver that acted.
     pub guards: Counters,
-    /// Largest root mean square distance of a frame's nodes from their muscle shapes. [mm]
+    /// Largest root mean square distance of a frame's nodes from their muscle shapes. (mm)
     pub settle_rms_max: f64,
     /// What reading the take had to decide.
     pub take: ClipNotes,

@@ -23,7 +23,7 @@ pub struct RigFaceOptions {
 pub struct RiggedFace {
     /// The rig.
     pub rig: Rig,
-    /// The face in the template's topology, in the head frame. [mm]
+    /// The face in the template's topology, in the head frame. (mm)
     pub normalized: Mesh,
     /// What registration measured; the time of building the rig is its last stage.
     pub report: RegistrationReport,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Times of many frames. [ms]
+/// Times of many frames. (ms)
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct TimeStatistics {
     /// Half of the frames take at most this.
@@ -18,7 +18,7 @@ pub struct TimeStatistics {
 }
 
 impl TimeStatistics {
-    /// Of these times [ms]; all zero for none.
+    /// Of these times (ms); all zero for none.
     pub fn of(mut times: Vec<f64>) -> Self {
         if times.is_empty() {
             return Self::default();

@@ -28,7 +28,7 @@ impl SurfaceEncoder {
         }
     }
 
-    /// All surfaces as one scene update; `positions` fit the surfaces. [mm]
+    /// All surfaces as one scene update; `positions` fit the surfaces. (mm)
     pub(super) fn scene(&self, nanos: u64, positions: &[&[Point3<f32>]]) -> wire::SceneUpdate {
         let mut first = 0;
         let mut entities = Vec::with_capacity(self.surfaces.len());

@@ -55,7 +55,7 @@ pub struct RecordingInfo {
     pub rig: String,
     /// Name and version of its template.
     pub template: String,
-    /// Frames a second of simulation. [1/s]
+    /// Frames a second of simulation. (1/s)
     pub fps: f64,
     /// Seed of everything random.
     pub seed: u64,
@@ -78,15 +78,15 @@ pub struct RecordingInfo {
 /// A rate is a wish: every n-th frame is written, n chosen so that the rate is not exceeded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordingOptions {
-    /// Rate of the skin and parts meshes, 0 for none. [1/s]
+    /// Rate of the skin and parts meshes, 0 for none. (1/s)
     pub skin_hz: f64,
-    /// Rate of the patch meshes, 0 for none. [1/s]
+    /// Rate of the patch meshes, 0 for none. (1/s)
     pub patches_hz: f64,
-    /// Rate of both point clouds, 0 for none. [1/s]
+    /// Rate of both point clouds, 0 for none. (1/s)
     pub points_hz: f64,
     /// Size at which a chunk is closed. [bytes before compression]
     pub chunk_bytes: u64,
-    /// Simulated time after which what is written is made safe against a crash. [s]
+    /// Simulated time after which what is written is made safe against a crash. (s)
     pub flush_secs: f64,
 }
 
@@ -125,13 +125,13 @@ pub struct LogEvent {
 /// One instant, borrowed from whoever computed it.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
-    /// Skin vertices in the head frame. [mm]
+    /// Skin vertices in the head frame. (mm)
     pub skin: &'a [Point3<f32>],
-    /// Nodes of every patch in the head frame. [mm]
+    /// Nodes of every patch in the head frame. (mm)
     pub patches: &'a [&'a [Point3<f32>]],
-    /// Vertices of every part in the head frame. [mm]
+    /// Vertices of every part in the head frame. (mm)
     pub parts: &'a [&'a [Point3<f32>]],
-    /// Where the head is: head frame to a fixed frame with +Y up. [mm]
+    /// Where the head is: head frame to a fixed frame with +Y up. (mm)
     pub head: Isometry3<f64>,
     /// One per [`RecordingInfo::weight_names`].
     pub weights: &'a [f32],
@@ -159,7 +159,7 @@ pub struct RecordingReport {
     pub bytes: u64,
     /// Frames recorded.
     pub frames: u64,
-    /// Simulated time. [s]
+    /// Simulated time. (s)
     pub duration_secs: f64,
     /// Topics that have messages.
     pub topics: Vec<TopicReport>,
@@ -204,7 +204,7 @@ impl RecordingInfo {
     }
 
     /// Time from frame to frame. Rounded up: viewers warn of a topic when its message count
-    /// over the duration exceeds 60 a second. [ns]
+    /// over the duration exceeds 60 a second. (ns)
     pub(super) fn step_nanos(&self) -> u64 {
         (1e9 / self.fps).ceil() as u64
     }

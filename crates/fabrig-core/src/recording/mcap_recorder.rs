@@ -173,7 +173,7 @@ impl McapRecorder {
         }
     }
 
-    /// Simulated time of the next frame. [ns]
+    /// Simulated time of the next frame. (ns)
     pub fn log_time_nanos(&self) -> u64 {
         self.frames * self.info.step_nanos()
     }

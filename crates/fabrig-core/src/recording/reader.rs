@@ -20,14 +20,14 @@ use super::{RecordingError, SurfaceInfo};
 pub struct RecordedSurface {
     /// Its name, colour and triangles.
     pub info: SurfaceInfo,
-    /// Vertices in the head frame, rounded as the recording is. [mm]
+    /// Vertices in the head frame, rounded as the recording is. (mm)
     pub positions: Vec<Point3<f64>>,
 }
 
 /// One instant of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedFrame {
-    /// Simulated time. [s]
+    /// Simulated time. (s)
     pub time_secs: f64,
     /// The skin.
     pub skin: Option<RecordedSurface>,
@@ -35,7 +35,7 @@ pub struct RecordedFrame {
     pub patches: Vec<RecordedSurface>,
     /// Eyeballs, teeth, tongue.
     pub parts: Vec<RecordedSurface>,
-    /// Where the head is. [mm]
+    /// Where the head is. (mm)
     pub head: Isometry3<f64>,
 }
 

@@ -21,7 +21,7 @@ use crate::{Point, Vector};
 const CUTOFF_MM: f64 = 14.0;
 const ROLL_COUNT: usize = 24;
 const TILTS_DEGREES: [f64; 3] = [-28.0, 0.0, 28.0];
-/// Sizes tried: the diagonal of the mesh's box would be this long. [mm]
+/// Sizes tried: the diagonal of the mesh's box would be this long. (mm)
 const DIAGONALS_MM: [f64; 11] = [
     210.0, 250.0, 300.0, 360.0, 430.0, 520.0, 620.0, 740.0, 900.0, 1150.0, 1500.0,
 ];
@@ -33,7 +33,7 @@ const REFINED_COUNT: usize = 20;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alignment {
     pub(super) to_head: Similarity3<f64>,
-    /// Mean capped distance of template face points. [mm]
+    /// Mean capped distance of template face points. (mm)
     pub(super) residual_mm: f64,
     /// 1 - residual / residual of the best alignment that differs from this one.
     pub(super) confidence: f64,
@@ -157,7 +157,7 @@ fn place(anchor: Point, nose: Point, turn: UnitQuaternion<f64>, scale: f64) -> S
 }
 
 /// Mean capped distance of template samples from the mesh, plus a penalty for normals that
-/// disagree. [mm]
+/// disagree. (mm)
 fn judge(grid: &ClosestGrid, samples: &[Sample], from_head: &Similarity3<f64>) -> f64 {
     let scale = from_head.scaling();
     let mut sum = 0.0;
@@ -380,7 +380,7 @@ fn refine(
     }
 }
 
-/// Mean capped distance, exact, with the penalty for normals of [`judge`]. [mm]
+/// Mean capped distance, exact, with the penalty for normals of [`judge`]. (mm)
 fn score(surface: &Surface, points: &[Sample], from_head: &Similarity3<f64>) -> f64 {
     let scale = from_head.scaling();
     let sum: f64 = points

@@ -44,9 +44,9 @@ pub enum RegistrationError {
          {mirrored_mm:.1} mm mirrored against {straight_mm:.1} mm as given"
     )]
     LandmarksMirrored {
-        /// RMS distance when mirrored. [mm]
+        /// RMS distance when mirrored. (mm)
         mirrored_mm: f64,
-        /// RMS distance as given. [mm]
+        /// RMS distance as given. (mm)
         straight_mm: f64,
     },
     /// No alignment stands out.

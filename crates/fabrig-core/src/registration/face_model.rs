@@ -8,9 +8,9 @@ use crate::mesh::{Surface, Topology, triangle_normals, vertex_normals};
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
 
-/// What lies farther than this from the nose tip is no part of the front of a face. [mm]
+/// What lies farther than this from the nose tip is no part of the front of a face. (mm)
 const FRONT_MM: f64 = 95.0;
-/// Detail is judged within this distance. [mm]
+/// Detail is judged within this distance. (mm)
 const DETAIL_MM: f64 = 12.0;
 
 /// How a template vertex takes part.

@@ -15,7 +15,7 @@ use crate::mesh::{Mesh, Surface, SurfacePoint, Topology, vertex_normals};
 use crate::template::RegionId;
 use crate::{Point, Vector};
 
-/// Places within this much of each other on both sides of a slit are in doubt. [mm]
+/// Places within this much of each other on both sides of a slit are in doubt. (mm)
 const DOUBT_MM: f64 = 3.0;
 
 /// A side of an opening: opening index * 2 for the upper one, + 1 for the lower one.

@@ -55,7 +55,7 @@ impl Pin {
     }
 }
 
-/// Stiffness of each stage, and the largest angle between normals. [degrees]
+/// Stiffness of each stage, and the largest angle between normals. (degrees)
 const STAGES: [(f64, f64); 7] = [
     (400.0, 60.0),
     (150.0, 60.0),
@@ -66,7 +66,7 @@ const STAGES: [(f64, f64); 7] = [
     (1.5, 45.0),
 ];
 const ROUNDS_PER_STAGE: usize = 3;
-/// Matches within this distance are never outliers. [mm]
+/// Matches within this distance are never outliers. (mm)
 const MIN_LIMIT_MM: f64 = 8.0;
 
 /// Deforms the template onto the target; `pins` gives the pins for the current positions, and

@@ -21,18 +21,18 @@ use crate::{Point, Vector};
 
 /// Columns from corner to corner.
 const COLUMN_COUNT: usize = 41;
-/// Rays reach this far above and below the expected line, one every [`STEP_MM`]. [mm]
+/// Rays reach this far above and below the expected line, one every [`STEP_MM`]. (mm)
 const HALF_HEIGHT_MM: f64 = 9.0;
 const STEP_MM: f64 = 0.25;
 /// Rows of a column.
 const ROW_COUNT: usize = (2.0 * HALF_HEIGHT_MM / STEP_MM) as usize + 1;
-/// What lies this far behind the skin beside it is inside the head. [mm]
+/// What lies this far behind the skin beside it is inside the head. (mm)
 const THROUGH_MM: f64 = 5.0;
-/// Neighbouring rays that differ by more see two surfaces. [mm]
+/// Neighbouring rays that differ by more see two surfaces. (mm)
 const JUMP_MM: f64 = 0.9;
 /// A valley is judged against the skin this many rows above and below.
 const VALLEY_ROWS: usize = 6;
-/// Evidence below this is noise. [mm]
+/// Evidence below this is noise. (mm)
 const MIN_EVIDENCE: f64 = 0.12;
 
 /// The parting of an opening.
@@ -42,7 +42,7 @@ pub(super) struct Parting {
     pub(super) columns: Vec<PartingColumn>,
     /// Whether one looks inside in most of the columns.
     is_through: bool,
-    /// From corner to corner. [mm]
+    /// From corner to corner. (mm)
     width: f64,
     up: Vector,
 }
@@ -61,7 +61,7 @@ pub(super) struct PartingColumn {
 /// Where a ray meets a surface.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
-    /// Along the view, towards the viewer. [mm]
+    /// Along the view, towards the viewer. (mm)
     depth: f64,
     point: Point,
     triangle: u32,
@@ -175,7 +175,7 @@ fn probe(surface: &Surface, fraction: f64, middle: &Point, up: &Vector, view: &V
 }
 
 /// Evidence for a parting at each row: 3 in a gap, the height of a step, twice the depth of a
-/// valley. [mm]
+/// valley. (mm)
 ///
 /// A gap is a run of rows between a drop and a rise, seen from below, that lies deeper than
 /// the skin at both its ends; a crease slopes down without a drop.

@@ -19,7 +19,7 @@ pub struct RigidComponent {
 
 /// Recognises the pieces other than the face itself.
 ///
-/// - `positions`: clean positions in the head frame [mm]; `registered`: the template there
+/// - `positions`: clean positions in the head frame (mm); `registered`: the template there
 pub(super) fn recognise(
     model: &FaceModel<'_>,
     clean: &CleanMesh,
@@ -87,7 +87,7 @@ fn eye_centers(model: &FaceModel<'_>, registered: &[Point]) -> Vec<(RigidBody, P
 }
 
 /// Where the face's eyes are, left first: the middles of its eyeballs where it has them, else
-/// behind its lids where these are open. In the frame that `to_head` leads to. [mm]
+/// behind its lids where these are open. In the frame that `to_head` leads to. (mm)
 pub(super) fn found_eyes(
     model: &FaceModel<'_>,
     clean: &CleanMesh,

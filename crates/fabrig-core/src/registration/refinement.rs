@@ -25,7 +25,7 @@ use super::target::{Target, geman_mcclure, median_and_deviation};
 use crate::mesh::{EdgeLaplacian, Surface, vertex_areas, vertex_normals};
 use crate::{Point, Vector};
 
-/// Length l [mm] and largest angle between normals [degrees] of each round.
+/// Length l (mm) and largest angle between normals (degrees) of each round.
 const ROUNDS: [(f64, f64); 12] = [
     (16.0, 55.0),
     (12.0, 55.0),
@@ -40,7 +40,7 @@ const ROUNDS: [(f64, f64); 12] = [
     (2.7, 45.0),
     (2.5, 45.0),
 ];
-/// Matches within this distance are never outliers, however well the rest fits. [mm]
+/// Matches within this distance are never outliers, however well the rest fits. (mm)
 const MIN_LIMIT_MM: f64 = 4.0;
 /// Vertices of the face that pull on the template, at most.
 const PULLING_COUNT: usize = 9000;

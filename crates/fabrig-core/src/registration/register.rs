@@ -31,7 +31,7 @@ use crate::template::{RegionId, Template};
 const MIN_TRIANGLE_COUNT: usize = 200;
 /// Pieces smaller than this share of the largest are not tried as the face.
 const PIECE_SHARE: f64 = 0.2;
-/// Alignments worse than this are not trusted whatever their margin. [mm]
+/// Alignments worse than this are not trusted whatever their margin. (mm)
 const MAX_RESIDUAL_MM: f64 = 8.0;
 
 /// What to register by.

@@ -8,7 +8,7 @@ use super::target::Target;
 use crate::mesh::{Surface, SurfaceError, triangle_normals, vertex_normals};
 use crate::{Point, Vector};
 
-/// Distances of a set of points. [mm]
+/// Distances of a set of points. (mm)
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct DistanceStatistics {
     /// How many points were measured.
@@ -46,7 +46,7 @@ impl DistanceStatistics {
 pub struct StageTime {
     /// Name of the stage.
     pub stage: String,
-    /// Wall-clock time. [s]
+    /// Wall-clock time. (s)
     pub seconds: f64,
 }
 
@@ -69,7 +69,7 @@ pub struct RegistrationReport {
     pub used_landmarks: bool,
     /// Margin of the alignment over the best one that differs, 0 to 1; 1 with landmarks.
     pub confidence: f64,
-    /// Mean capped distance right after alignment, before the template was deformed. [mm]
+    /// Mean capped distance right after alignment, before the template was deformed. (mm)
     pub alignment_residual_mm: f64,
     /// Millimetres per unit of the user's mesh.
     pub millimetres_per_unit: f64,
@@ -106,7 +106,7 @@ impl RegistrationReport {
         self.eyes.map(|e| e == OpeningState::Fused)
     }
 
-    /// Time of all stages. [s]
+    /// Time of all stages. (s)
     pub fn total_seconds(&self) -> f64 {
         self.times.iter().map(|t| t.seconds).sum()
     }
@@ -121,7 +121,7 @@ pub(super) struct Measures {
     pub(super) triangle_quality: [f64; 3],
 }
 
-/// Distances beyond this mean that there is no counterpart. [mm]
+/// Distances beyond this mean that there is no counterpart. (mm)
 const COUNTERPART_MM: f64 = 6.0;
 
 /// Measures `registered` against the target.

@@ -12,7 +12,7 @@ pub(super) struct Match {
     pub(super) is_on_boundary: bool,
 }
 
-/// The face's main piece, placed in the head frame. [mm]
+/// The face's main piece, placed in the head frame. (mm)
 pub(super) struct Target {
     pub(super) positions: Vec<Point>,
     pub(super) triangles: Vec<[u32; 3]>,

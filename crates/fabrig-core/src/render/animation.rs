@@ -11,7 +11,7 @@ use super::{Image, RenderError};
 
 /// Writes frames as an endless GIF.
 ///
-/// - `frame_secs`: time each frame stays [s]; GIF counts hundredths, and most viewers slow
+/// - `frame_secs`: time each frame stays (s); GIF counts hundredths, and most viewers slow
 ///   anything below 0.02 s down.
 ///
 /// # Errors

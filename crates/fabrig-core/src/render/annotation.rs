@@ -42,7 +42,7 @@ fn font(height: u32) -> &'static MonoFont<'static> {
     }
 }
 
-/// Height of text that suits a picture's height. [pixels]
+/// Height of text that suits a picture's height. (pixels)
 pub(super) fn text_height(picture_height: u32) -> u32 {
     (picture_height / 46).clamp(9, 20)
 }
@@ -76,7 +76,7 @@ pub(super) fn write_text(
     let Ok(_) = text.draw(image);
 }
 
-/// Width of a line of text. [pixels]
+/// Width of a line of text. (pixels)
 fn text_width(text: &str, height: u32) -> i32 {
     let font = font(height);
     let cell = font.character_size.width + font.character_spacing;

@@ -26,7 +26,7 @@ pub enum View {
     Top,
     /// From below the chin.
     Below,
-    /// Any other. [degrees]
+    /// Any other. (degrees)
     Angles {
         /// Turn towards the character's left.
         yaw: f64,
@@ -36,7 +36,7 @@ pub enum View {
 }
 
 impl View {
-    /// (yaw, pitch). [rad]
+    /// (yaw, pitch). (rad)
     fn angles(self) -> (f64, f64) {
         let (yaw, pitch) = match self {
             Self::Front => (0.0, 0.0),
@@ -102,11 +102,11 @@ impl FromStr for View {
 pub enum Projection {
     /// Parallel rays; the number is the height of the picture in world units.
     Orthographic(f64),
-    /// Rays through one point; the number is the vertical field of view. [rad]
+    /// Rays through one point; the number is the vertical field of view. (rad)
     Perspective(f64),
 }
 
-/// The field of view of a portrait lens. [rad]
+/// The field of view of a portrait lens. (rad)
 const PORTRAIT_FIELD: f64 = 0.33;
 
 /// A placed camera.

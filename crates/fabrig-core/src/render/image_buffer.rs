@@ -12,7 +12,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use super::RenderError;
 use crate::atomic_file::write_atomically;
 
-/// Longest side of a picture. [pixels]
+/// Longest side of a picture. (pixels)
 const SIDE_LIMIT: u32 = 16_384;
 
 /// A finished picture: 8-bit sRGB, rows from the top, no alpha.

@@ -61,7 +61,7 @@ impl Material {
 pub struct Edges {
     /// Colour of the lines.
     pub color: Rgb,
-    /// Width. [pixels]
+    /// Width. (pixels)
     pub width: f32,
     /// 1 hides the surface under the lines.
     pub opacity: f32,

@@ -14,7 +14,7 @@ use crate::{Point, Vector};
 const AMBIENT_RAYS: usize = 24;
 /// Rays towards the key light, which is a disc.
 const KEY_RAYS: usize = 6;
-/// Half the angle under which the key light's disc is seen. [rad]
+/// Half the angle under which the key light's disc is seen. (rad)
 const KEY_SPREAD: f64 = 0.14;
 /// Occluders count up to this share of the scene's radius, fading with distance.
 const AMBIENT_REACH: f64 = 0.35;

@@ -24,7 +24,7 @@ use crate::{Point, Vector};
 pub struct RigOptions {
     /// How many nodes the patches have.
     pub resolution: Resolution,
-    /// Shapes that move no node of a patch by this much are left out of it. [mm]
+    /// Shapes that move no node of a patch by this much are left out of it. (mm)
     pub threshold: f64,
     /// How patches follow the jaw.
     pub jaw_mode: JawMode,

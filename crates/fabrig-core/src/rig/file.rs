@@ -21,7 +21,7 @@ pub const FORMAT_VERSION: u32 = 1;
 const MARK: &[u8; 8] = b"FABRIG\r\n";
 const HEADER_LENGTH: usize = 24;
 const COMPRESSION_LEVEL: i32 = 9;
-/// No honest rig decompresses to more. [bytes]
+/// No honest rig decompresses to more. (bytes)
 const LARGEST_CONTENT: usize = 4 << 30;
 
 impl Rig {

@@ -28,6 +28,9 @@ use crate::transfer::{
     TransferError,
 };
 
+/// Where Eq. 3 puts the nodes of a patch: positions [mm, head frame], velocities (mm/s).
+pub type NodeTargets = (Vec<Point3<f32>>, Vec<Vector3<f32>>);
+
 /// The lower jaw of a face.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigJaw {
@@ -100,7 +103,7 @@ impl Rig {
             .collect()
     }
 
-    /// The user's mesh in the head frame. [mm], shape [face vertex_count]
+    /// The user's mesh in the head frame. (mm), shape [face vertex_count]
     pub fn skin_at_rest(&self) -> Vec<Point3<f32>> {
         self.face
             .positions()
@@ -142,7 +145,7 @@ impl Rig {
 
     /// Eq. 3 on every patch: where the muscle shapes want the nodes, and how fast that moves.
     ///
-    /// `out` holds one list of positions [mm, head frame] and one of velocities [mm/s] a
+    /// `out` holds one list of positions [mm, head frame] and one of velocities (mm/s) a
     /// patch; they are resized.
     ///
     /// # Errors
@@ -152,7 +155,7 @@ impl Rig {
     pub fn targets(
         &self,
         at: ShapeWeights<'_>,
-        out: &mut [(Vec<Point3<f32>>, Vec<Vector3<f32>>)],
+        out: &mut [NodeTargets],
     ) -> Result<(), TransferError> {
         self.check_weights(at.weights)?;
         if let Some(rates) = at.rates {

@@ -20,7 +20,7 @@ pub struct RigPart {
 
 /// Names the pieces that registration found, and puts the sockets where the eyeballs are.
 ///
-/// - `positions`: the mesh in the head frame [mm]
+/// - `positions`: the mesh in the head frame (mm)
 /// - `eyes`: sockets as the skin has them
 pub(super) fn name_parts(
     components: &[RigidComponent],

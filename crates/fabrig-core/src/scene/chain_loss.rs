@@ -14,10 +14,10 @@ use crate::rig::Rig;
 use crate::scene::{FacePose, Scene, SceneError, Simulation};
 use crate::template::{RegionId, Template};
 
-/// A vertex moves where a shape displaces it by this much. [mm]
+/// A vertex moves where a shape displaces it by this much. (mm)
 const MOVED: f64 = 0.05;
 
-/// Errors over a set of vertices. [mm]
+/// Errors over a set of vertices. (mm)
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct LossFigures {
     /// Vertices in the set.
@@ -53,7 +53,7 @@ impl LossFigures {
 pub struct ShapeLoss {
     /// Name of the shape.
     pub shape: String,
-    /// Largest displacement of the shape itself. [mm]
+    /// Largest displacement of the shape itself. (mm)
     pub amplitude: f64,
     /// Over the vertices that the shape moves.
     pub moved: LossFigures,
@@ -61,13 +61,13 @@ pub struct ShapeLoss {
     pub contours: LossFigures,
     /// Over the vertices that the shape leaves still: what leaks.
     pub still: LossFigures,
-    /// Root mean square distance of the patches from their muscle shapes. [mm]
+    /// Root mean square distance of the patches from their muscle shapes. (mm)
     pub settle_rms: f64,
 }
 
-/// Step with which a pose is held. [s]
+/// Step with which a pose is held. (s)
 const HOLD_STEP: f64 = 1.0 / 60.0;
-/// A face holds still once no skin vertex moves this much in a step. [mm]
+/// A face holds still once no skin vertex moves this much in a step. (mm)
 const STILL: f32 = 2e-4;
 /// Steps after which a face is taken as it is.
 const LONGEST_HOLD: usize = 240;
@@ -146,7 +146,7 @@ pub fn contour_vertices(template: &Template) -> Vec<u32> {
 
 /// Compares one posed skin with the shape it should be.
 ///
-/// - `rest`, `posed`: skin in the template's vertex order [mm]
+/// - `rest`, `posed`: skin in the template's vertex order (mm)
 pub fn shape_loss(
     template: &Template,
     contours: &[u32],

@@ -37,9 +37,9 @@ pub struct Scene {
     /// How the cloth is solved.
     pub cloth: ClothOptions,
     /// Gravity in the world. The face was captured under standing gravity, so only what
-    /// differs from that, seen from the head, bends it. [mm/s^2]
+    /// differs from that, seen from the head, bends it. (mm/s^2)
     pub gravity: Vector3<f32>,
-    /// Velocity of the air in the world, added to the take's own wind. [mm/s]
+    /// Velocity of the air in the world, added to the take's own wind. (mm/s)
     pub wind: Vector3<f32>,
     /// Whether the take moves the head.
     pub head_motion: bool,

@@ -14,7 +14,7 @@ pub(super) fn head_to_world(pose: &HeadPose, pivot: &Point) -> Isometry3<f64> {
 }
 
 /// Motion of the head frame between three poses `h` seconds apart, in its own axes at the
-/// middle one. Also returns the velocity of its origin there, in the world. [mm/s]
+/// middle one. Also returns the velocity of its origin there, in the world. (mm/s)
 pub(super) fn head_motion(
     before: &Isometry3<f64>,
     now: &Isometry3<f64>,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Attachment;
@@ -11,7 +11,7 @@ use crate::cloth::{
     Cloth, ClothAttachment, ClothPatch, FrameInput, HeadMotion, Materials, PatchMotion, StepReport,
 };
 use crate::motion::{Clip, EyeAngles, Sample};
-use crate::rig::Rig;
+use crate::rig::{NodeTargets, Rig};
 use crate::scene::head::{head_motion, head_to_world};
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
@@ -19,7 +19,7 @@ use crate::template::RigidBody;
 use crate::transfer::ShapeWeights;
 use crate::{Point, Vector};
 
-/// Distance in time over which the motion of the head is differentiated. [s]
+/// Distance in time over which the motion of the head is differentiated. (s)
 const HEAD_STEP: f64 = 1.0 / 60.0;
 
 /// What drives a face at one instant.
@@ -27,15 +27,15 @@ const HEAD_STEP: f64 = 1.0 / 60.0;
 pub struct FacePose {
     /// Weight of each shape of the rig, in its order.
     pub weights: Vec<f32>,
-    /// Rate of each weight. [1/s]
+    /// Rate of each weight. (1/s)
     pub rates: Vec<f32>,
-    /// From the head frame to the world. [mm]
+    /// From the head frame to the world. (mm)
     pub head: Isometry3<f64>,
     /// How the head frame moves.
     pub head_motion: HeadMotion,
     /// Where the eyes look, where the take says so.
     pub eyes: Option<[EyeAngles; 2]>,
-    /// Velocity of the air relative to the head, in world axes. [mm/s]
+    /// Velocity of the air relative to the head, in world axes. (mm/s)
     pub wind: Vector,
 }
 
@@ -56,19 +56,19 @@ impl FacePose {
 /// What a frame took and did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameReport {
-    /// Time on the take's axis at the end of the frame. [s]
+    /// Time on the take's axis at the end of the frame. (s)
     pub time: f64,
-    /// Evaluating the muscle shapes. [ms]
+    /// Evaluating the muscle shapes. (ms)
     pub targets_ms: f64,
-    /// The cloth. [ms]
+    /// The cloth. (ms)
     pub cloth_ms: f64,
-    /// The skin. [ms]
+    /// The skin. (ms)
     pub skin_ms: f64,
     /// What the cloth reported; all zero without dynamics.
     pub step: StepReport,
-    /// Root mean square distance of the nodes from their muscle shapes. [mm]
+    /// Root mean square distance of the nodes from their muscle shapes. (mm)
     pub settle_rms: f64,
-    /// Largest of these distances. [mm]
+    /// Largest of these distances. (mm)
     pub settle_max: f64,
 }
 
@@ -92,7 +92,7 @@ pub struct Simulation {
     pose: FacePose,
     sample: Sample,
     cloth: Option<Cloth>,
-    evaluated: Vec<(Vec<Point3<f32>>, Vec<Vector3<f32>>)>,
+    evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
     anchor_nodes: Vec<Vec<u32>>,
@@ -272,7 +272,7 @@ impl Simulation {
         &self.scene
     }
 
-    /// Time on the clip's axis. [s]
+    /// Time on the clip's axis. (s)
     pub fn time(&self) -> f64 {
         self.time
     }
@@ -302,7 +302,7 @@ impl Simulation {
             .collect()
     }
 
-    /// From the head frame to the world. [mm]
+    /// From the head frame to the world. (mm)
     pub fn head(&self) -> &Isometry3<f64> {
         &self.pose.head
     }
@@ -357,7 +357,7 @@ impl Simulation {
             .collect()
     }
 
-    /// Root mean square and largest distance of the nodes from their muscle shapes. [mm]
+    /// Root mean square and largest distance of the nodes from their muscle shapes. (mm)
     pub fn settle_error(&self) -> (f64, f64) {
         let (mut sum, mut count, mut largest) = (0.0, 0usize, 0.0f64);
         for (patch, target) in self.targets.iter().enumerate() {

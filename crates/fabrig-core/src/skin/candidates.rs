@@ -10,7 +10,7 @@ use crate::{Point, Vector};
 pub struct Candidate {
     /// Index over all nodes, patch after patch.
     pub node: u32,
-    /// Distance from the vertex to the place on the skin above the node. [mm]
+    /// Distance from the vertex to the place on the skin above the node. (mm)
     pub distance: f64,
 }
 
@@ -25,7 +25,7 @@ const CAVITY_REACH: f64 = 1.5;
 const CAVITY_CHOICE: usize = 2;
 
 struct Anchor {
-    /// The place on the skin above the node. [mm]
+    /// The place on the skin above the node. (mm)
     point: Point,
     normal: Vector,
     region: RegionId,
@@ -44,7 +44,7 @@ pub struct CandidateFinder<'a> {
     /// Rings of the grid taken around the nearest node of a patch.
     rings: i64,
     candidate_limit: usize,
-    /// No node further away than this is taken. [mm]
+    /// No node further away than this is taken. (mm)
     reach: f64,
 }
 

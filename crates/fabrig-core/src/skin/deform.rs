@@ -18,7 +18,7 @@ pub struct SkinDeformer {
 impl SkinDeformer {
     /// Prepares a skin.
     ///
-    /// - `patches`: each grid with its nodes at rest [mm]
+    /// - `patches`: each grid with its nodes at rest (mm)
     /// - `rest`: skin at rest, one per vertex of `binding` [mm, head frame]
     ///
     /// # Errors

@@ -23,7 +23,7 @@ use crate::template::Template;
 /// How weights are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitOptions {
-    /// No node further away is taken; the kernel ends here. [mm]
+    /// No node further away is taken; the kernel ends here. (mm)
     pub reach: f64,
     /// Patches that one vertex may hang on.
     pub patch_limit: usize,
@@ -57,7 +57,7 @@ impl Default for FitOptions {
 pub struct Pose {
     /// What every candidate body does: all nodes, patch after patch, then the mandible.
     pub affines: Vec<NodeAffine>,
-    /// What the skin of the template does. [mm], shape [vertex_count]
+    /// What the skin of the template does. (mm), shape `[vertex_count]`
     pub displacements: Vec<Vector3<f32>>,
 }
 

@@ -9,7 +9,7 @@ use crate::anatomy::GridShape;
 pub struct NodeAffine {
     /// R - I.
     pub turn: Matrix3<f32>,
-    /// (q' - q) - (R - I) q. [mm]
+    /// (q' - q) - (R - I) q. (mm)
     pub shift: Vector3<f32>,
 }
 
@@ -22,7 +22,7 @@ impl NodeAffine {
         }
     }
 
-    /// The displacement it gives a point. [mm]
+    /// The displacement it gives a point. (mm)
     pub fn displacement(&self, at: &Point3<f32>) -> Vector3<f32> {
         self.turn * at.coords + self.shift
     }
@@ -37,18 +37,18 @@ pub struct NodeFrames {
 }
 
 impl NodeFrames {
-    /// Takes a patch at rest. [mm]
+    /// Takes a patch at rest. (mm)
     pub fn new(grid: GridShape, rest: Vec<Point3<f32>>) -> Self {
         let frames = (0..rest.len()).map(|i| frame(grid, &rest, i)).collect();
         Self { grid, rest, frames }
     }
 
-    /// The patch at rest. [mm]
+    /// The patch at rest. (mm)
     pub fn rest(&self) -> &[Point3<f32>] {
         &self.rest
     }
 
-    /// What each node does, given where the nodes are now (same length). [mm]
+    /// What each node does, given where the nodes are now (same length). (mm)
     ///
     /// A patch that stands at rest gives exactly zero.
     pub fn affines(&self, now: &[Point3<f32>], out: &mut [NodeAffine]) {

@@ -9,7 +9,7 @@ pub fn falloff(d: f64, radius: f64) -> f64 {
 
 /// Weights of nodes at the given distances: kernel with a radius just beyond the furthest,
 /// normalized to a sum that falls from one to zero as the nearest goes from 0 to `reach`.
-/// What is missing to one is the skull's. [mm]
+/// What is missing to one is the skull's. (mm)
 pub fn weights(distances: &[f64], reach: f64) -> Vec<f64> {
     let furthest = distances.iter().copied().fold(0.0, f64::max);
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);

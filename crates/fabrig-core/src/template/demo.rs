@@ -17,7 +17,7 @@ pub(super) struct StoredFace {
     pub(super) groups: Vec<(String, Vec<Steps>, Vec<[u32; 3]>)>,
     /// Columns of the rotation.
     pub(super) rotation: [[f64; 3]; 3],
-    /// Length of one unit of the face. [mm]
+    /// Length of one unit of the face. (mm)
     pub(super) millimetres_per_unit: f64,
     /// Where the middle between the eyes goes, in the face's unit.
     pub(super) place: [f64; 3],

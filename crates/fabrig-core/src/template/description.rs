@@ -61,11 +61,11 @@ pub(super) struct BuildRecipe {
     /// Source vertex on the mid plane at the front of the neck where the head is cut off; the
     /// cut follows the edge loop through it.
     pub(super) neck_vertex: u32,
-    /// Length of one source unit. [mm]
+    /// Length of one source unit. (mm)
     pub(super) millimetres_per_unit: f64,
     /// Landmark pair whose midpoint is the origin of the head frame.
     pub(super) origin: String,
-    /// Angles of eyeLookUp, eyeLookDown, eyeLookIn and eyeLookOut at weight 1. [degrees]
+    /// Angles of eyeLookUp, eyeLookDown, eyeLookIn and eyeLookOut at weight 1. (degrees)
     pub(super) look_degrees: [f64; 4],
     /// Names of the whole-face shapes in the pack's order.
     pub(super) shapes: Vec<String>,
@@ -92,15 +92,15 @@ pub(super) struct BuildRecipe {
 pub(super) struct LidRecipe {
     /// Shapes under which the lids meet.
     pub(super) closing: Vec<String>,
-    /// What stays open between closed lids. [mm]
+    /// What stays open between closed lids. (mm)
     pub(super) gap: f64,
-    /// Lids keep the distance from the eyeball that they have at rest, up to this. [mm]
+    /// Lids keep the distance from the eyeball that they have at rest, up to this. (mm)
     pub(super) clearance: f64,
-    /// How far from the margin corrections reach. [mm]
+    /// How far from the margin corrections reach. (mm)
     pub(super) reach: f64,
-    /// How far corrections of neighbouring margin vertices mix. [mm]
+    /// How far corrections of neighbouring margin vertices mix. (mm)
     pub(super) blur: f64,
-    /// How much nearer to the eyeball's centre the next ring of the margin must be. [mm]
+    /// How much nearer to the eyeball's centre the next ring of the margin must be. (mm)
     pub(super) ring_step: f64,
 }
 
@@ -109,7 +109,7 @@ pub(super) struct LidRecipe {
 #[serde(deny_unknown_fields)]
 pub(super) struct LiningRecipe {
     /// Distances from the lids up to which a socket's skin moves fully, and from which not at
-    /// all. [mm]
+    /// all. (mm)
     pub(super) socket: [f64; 2],
     /// Beginnings of the names of shapes that do not move the mouth cavity.
     pub(super) leave_mouth_still: Vec<String>,
@@ -121,15 +121,15 @@ pub(super) struct LiningRecipe {
 pub(super) struct LipRecipe {
     /// Shapes that only make sense on top of another: name -> the other. Both have no side.
     pub(super) over: BTreeMap<String, String>,
-    /// How far the surroundings follow. [mm]
+    /// How far the surroundings follow. (mm)
     pub(super) blur: f64,
-    /// How deep the lining counts, behind the corner of the mouth. [mm]
+    /// How deep the lining counts, behind the corner of the mouth. (mm)
     pub(super) lining: f64,
-    /// Half the width of the blend from side to side. [mm]
+    /// Half the width of the blend from side to side. (mm)
     pub(super) side_blend: f64,
-    /// Crossings that may stay. [mm]
+    /// Crossings that may stay. (mm)
     pub(super) tolerance: f64,
-    /// Deeper overlaps are another part of the mouth, not a crossing. [mm]
+    /// Deeper overlaps are another part of the mouth, not a crossing. (mm)
     pub(super) deepest: f64,
     /// Rounds at most.
     pub(super) rounds: u32,

@@ -73,7 +73,7 @@ pub struct RigidPart {
     pub name: String,
     /// What it moves with.
     pub follows: RigidBody,
-    /// Its surface at rest. [mm]
+    /// Its surface at rest. (mm)
     pub mesh: Mesh,
 }
 
@@ -81,28 +81,28 @@ pub struct RigidPart {
 /// and slides by the translations of `jawForward`, `jawLeft` and `jawRight`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct JawHinge {
-    /// A point on the axis, in the mid plane. [mm]
+    /// A point on the axis, in the mid plane. (mm)
     pub center: Point,
     /// Unit direction, +X for an upright symmetric head; turning by a positive angle about it
     /// opens the mouth (right-hand rule: +Y towards +Z, so the chin goes down and back is a
     /// positive turn).
     pub axis: Vector,
-    /// Angle at `jawOpen` = 1. [rad]
+    /// Angle at `jawOpen` = 1. (rad)
     pub open_angle: f64,
-    /// Translation of the mandible at `jawForward` = 1. [mm]
+    /// Translation of the mandible at `jawForward` = 1. (mm)
     pub forward: Vector,
-    /// Translation of the mandible at `jawLeft` = 1; `jawRight` is its mirror. [mm]
+    /// Translation of the mandible at `jawLeft` = 1; `jawRight` is its mirror. (mm)
     pub left: Vector,
 }
 
 /// The sphere that an eyeball is, and how far it turns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct EyeSocket {
-    /// Centre of rotation. [mm]
+    /// Centre of rotation. (mm)
     pub center: Point,
-    /// Radius of the fitted sphere. [mm]
+    /// Radius of the fitted sphere. (mm)
     pub radius: f64,
-    /// Angles at weight 1 of eyeLookUp, eyeLookDown, eyeLookIn, eyeLookOut. [rad]
+    /// Angles at weight 1 of eyeLookUp, eyeLookDown, eyeLookIn, eyeLookOut. (rad)
     pub look_angles: [f64; 4],
 }
 
@@ -111,7 +111,7 @@ pub struct EyeSocket {
 pub struct WholeFaceShape {
     /// ARKit name (`jawOpen`, ...) or the pack's own.
     pub name: String,
-    /// Vertices that move and by how much at weight 1, vertex indices rising. [mm]
+    /// Vertices that move and by how much at weight 1, vertex indices rising. (mm)
     pub deltas: Vec<(u32, Vector)>,
 }
 
@@ -125,7 +125,7 @@ pub struct Template {
     pub version: u32,
     /// Whose work the pack stands on, and under which licence.
     pub credit: String,
-    /// Neutral skin; its polygon fans are exact mirrors of each other. [mm]
+    /// Neutral skin; its polygon fans are exact mirrors of each other. (mm)
     pub skin: Mesh,
     /// For each skin vertex its mirror image at (-x, y, z); itself on the mid plane (x = 0).
     pub mirror: Vec<u32>,
@@ -140,7 +140,7 @@ pub struct Template {
     /// Whole-face shapes in the pack's order (ARKit's 52 first).
     pub shapes: Vec<WholeFaceShape>,
     /// Deltas of each shape on the rigid parts that deform (tongueOut moves the tongue):
-    /// (shape index, part index, one vector per part vertex). [mm]
+    /// (shape index, part index, one vector per part vertex). (mm)
     pub part_deltas: Vec<(u32, u32, Vec<Vector>)>,
     /// The jaw.
     pub jaw: JawHinge,
@@ -155,7 +155,7 @@ pub struct Template {
 }
 
 impl Template {
-    /// Position of a landmark on the neutral template. [mm]
+    /// Position of a landmark on the neutral template. (mm)
     pub fn landmark(&self, name: &str) -> Option<Point> {
         self.landmarks
             .get(name)

@@ -23,7 +23,7 @@ pub fn size_ratio(kind: PatchKind, grid: GridShape, template: &[Point], face: &[
     }
 }
 
-/// Mean length of the grid lines along u. [mm]
+/// Mean length of the grid lines along u. (mm)
 fn fibre_length(grid: GridShape, nodes: &[Point]) -> f64 {
     let mut total = 0.0;
     for v in 0..grid.v_count {

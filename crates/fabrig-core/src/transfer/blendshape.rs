@@ -26,7 +26,7 @@ pub struct MuscleShape {
     pub name: String,
     /// Index in [`Template::shapes`].
     pub shape: u32,
-    /// Displacement of every node at weight 1 on the template. [mm], shape [node_count]
+    /// Displacement of every node at weight 1 on the template. (mm), shape `[node_count]`
     pub deltas: Vec<Vector3<f32>>,
 }
 
@@ -57,7 +57,7 @@ pub struct ShapeSampler<'a> {
 
 /// One shape at weight 1 on every skin vertex.
 pub struct SampledShape {
-    /// Displacements of the skin. [mm]
+    /// Displacements of the skin. (mm)
     deltas: Vec<Vector>,
     /// Change of the smoothed normals.
     normal_deltas: Vec<Vector>,
@@ -104,7 +104,7 @@ impl<'a> ShapeSampler<'a> {
         }
     }
 
-    /// Displacement of one node under a sampled shape. [mm]
+    /// Displacement of one node under a sampled shape. (mm)
     pub fn node_delta(&self, shape: &SampledShape, node: &SurfaceNode) -> Vector {
         let corners = self.triangles[node.triangle as usize];
         let mut delta = Vector::zeros();

@@ -9,9 +9,9 @@ use crate::template::Template;
 use crate::transfer::EyeShapes;
 use crate::{Point, Vector};
 
-/// Lid vertices further apart than this in the template's closed pose do not meet. [mm]
+/// Lid vertices further apart than this in the template's closed pose do not meet. (mm)
 const MEETING_DISTANCE: f64 = 2.0;
-/// Width of the average over margin vertices that a lid vertex takes its correction from. [mm]
+/// Width of the average over margin vertices that a lid vertex takes its correction from. (mm)
 const MARGIN_WIDTH: f64 = 4.0;
 
 /// A margin vertex and what its opposite leaves open.
@@ -36,7 +36,7 @@ pub struct LidClosing<'a> {
 }
 
 impl<'a> LidClosing<'a> {
-    /// Finds the pairs that meet; `positions` is the face in the template's topology. [mm]
+    /// Finds the pairs that meet; `positions` is the face in the template's topology. (mm)
     pub fn new(template: &'a Template, positions: &'a [Point]) -> Self {
         let eyes = ["l", "r"]
             .into_iter()
@@ -77,7 +77,7 @@ impl<'a> LidClosing<'a> {
 
     /// What to add to `alpha * delta` of each blink so that the lids of this face meet.
     ///
-    /// Returns (shape index, one correction per template vertex [mm]).
+    /// Returns (shape index, one correction per template vertex (mm)).
     pub fn corrections(&self, alpha: f64) -> Vec<(u32, Vec<Vector>)> {
         self.eyes
             .iter()

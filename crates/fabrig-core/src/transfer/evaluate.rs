@@ -11,7 +11,7 @@ use crate::transfer::{JawField, JawMode, JawShapes, LidField, MuscleShape};
 pub struct ShapeWeights<'a> {
     /// Weight of each template shape.
     pub weights: &'a [f32],
-    /// Rate of each weight, same length. [1/s]
+    /// Rate of each weight, same length. (1/s)
     pub rates: Option<&'a [f32]>,
 }
 
@@ -55,8 +55,8 @@ pub struct PatchTransfer {
 impl PatchTransfer {
     /// Evaluates Eq. 3 with the hinge and the lids.
     ///
-    /// - `neutral`: b_0 [mm]; `positions`: receives X [mm]; `velocities`: receives dX/dt
-    ///   [mm/s], zero where `at` has no rates. All of one length, the patch's node count.
+    /// - `neutral`: b_0 (mm); `positions`: receives X (mm); `velocities`: receives dX/dt
+    ///   (mm/s), zero where `at` has no rates. All of one length, the patch's node count.
     ///
     /// With all weights zero, X equals b_0 bit for bit.
     pub fn evaluate(

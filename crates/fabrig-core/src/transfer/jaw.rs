@@ -33,9 +33,9 @@ pub enum JawMode {
 /// Where a rigid mandible stands: a turn about the hinge, then a slide.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JawPose {
-    /// Angle about the hinge, positive opens. [rad]
+    /// Angle about the hinge, positive opens. (rad)
     pub angle: f64,
-    /// Slide. [mm]
+    /// Slide. (mm)
     pub slide: Vector,
 }
 
@@ -73,24 +73,24 @@ pub(super) fn turn(hinge: &JawHinge, angle: f64) -> Matrix3<f64> {
 pub struct JawField {
     /// Share in the turn of the mandible, 0 skull to 1 mandible.
     pub open: Vec<f32>,
-    /// What opening does besides turning, at weight 1 on the template. [mm]
+    /// What opening does besides turning, at weight 1 on the template. (mm)
     pub open_residual: Vec<Vector3<f32>>,
     /// Share of the turn that closing the lips takes back.
     pub close: Vec<f32>,
-    /// What closing does besides turning. [mm]
+    /// What closing does besides turning. (mm)
     pub close_residual: Vec<Vector3<f32>>,
-    /// Coefficient of the product of both weights. [mm]
+    /// Coefficient of the product of both weights. (mm)
     pub pair: Vec<Vector3<f32>>,
 }
 
-/// Displacement below which a rigid turn says nothing about participation. [mm]
+/// Displacement below which a rigid turn says nothing about participation. (mm)
 const TURN_FLOOR: f64 = 1.5;
 
 impl JawField {
     /// Splits the jaw shapes of a patch on the template.
     ///
-    /// - `nodes`: rest positions on the template [mm]
-    /// - `open`, `close`: displacements of the two shapes at weight 1 [mm]; `None` where the
+    /// - `nodes`: rest positions on the template (mm)
+    /// - `open`, `close`: displacements of the two shapes at weight 1 (mm); `None` where the
     ///   patch does not move
     ///
     /// Returns `None` where neither moves the patch.

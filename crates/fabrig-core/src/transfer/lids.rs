@@ -17,7 +17,7 @@ use crate::Point;
 use crate::template::EyeSocket;
 use crate::transfer::MuscleShape;
 
-/// Height over the eyeball up to which a node slides fully, and from which not at all. [mm]
+/// Height over the eyeball up to which a node slides fully, and from which not at all. (mm)
 const SLIDE_HEIGHTS: [f64; 2] = [4.0, 10.0];
 
 /// One node that slides.
@@ -29,12 +29,12 @@ pub struct LidNode {
     pub eye: u8,
     /// How much of its motion slides, in (0, 1].
     pub share: f32,
-    /// Distance from the eye's centre at rest on this face. [mm]
+    /// Distance from the eye's centre at rest on this face. (mm)
     pub rest_radius: f32,
     /// Change of that distance at weight 1, one per shape of the patch, as displaced on this
-    /// face (alpha included). [mm]
+    /// face (alpha included). (mm)
     pub radius_changes: Vec<f32>,
-    /// Distance below which no sum of shapes takes it. [mm]
+    /// Distance below which no sum of shapes takes it. (mm)
     pub least_radius: f32,
 }
 
@@ -48,8 +48,8 @@ pub struct LidField {
 impl LidField {
     /// Finds the nodes of a patch that lie over an eyeball.
     ///
-    /// - `template_nodes`, `template_eyes`: the patch and eyes at rest on the template [mm]
-    /// - `nodes`, `eyes`: the patch and centres of rotation at rest on this face [mm]
+    /// - `template_nodes`, `template_eyes`: the patch and eyes at rest on the template (mm)
+    /// - `nodes`, `eyes`: the patch and centres of rotation at rest on this face (mm)
     ///
     /// Returns `None` where there are none.
     pub fn new(
@@ -95,8 +95,8 @@ impl LidField {
 impl LidNode {
     /// Puts the node at its distance from the eye.
     ///
-    /// - `position`, `velocity`: where the sum of shapes has it [mm], [mm/s]
-    /// - `radius_change`, `radius_rate`: `sum_i w_i Dr_i` and its rate [mm], [mm/s]
+    /// - `position`, `velocity`: where the sum of shapes has it (mm), (mm/s)
+    /// - `radius_change`, `radius_rate`: `sum_i w_i Dr_i` and its rate (mm), (mm/s)
     pub(super) fn slide(
         &self,
         center: &Point3<f32>,
@@ -155,7 +155,15 @@ mod tests {
             shape: 0,
             deltas: vec![(closed - open).cast()],
         };
-        let field = LidField::new(&[open], &eyes, &[open], &eyes, &[shape.clone()], 1.0).unwrap();
+        let field = LidField::new(
+            &[open],
+            &eyes,
+            &[open],
+            &eyes,
+            std::slice::from_ref(&shape),
+            1.0,
+        )
+        .unwrap();
         let node = &field.nodes[0];
         let center = eyes[0].center.cast::<f32>();
         let mut half = open.cast::<f32>() + shape.deltas[0] * 0.5;

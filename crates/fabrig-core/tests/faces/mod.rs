@@ -11,7 +11,7 @@ use fabrig_core::scene::FacePose;
 use fabrig_core::template;
 
 /// The template's own skin, registered exactly.
-pub fn template_rig() -> Rig {
+pub(crate) fn template_rig() -> Rig {
     let template = template::human();
     let places = places_of_self(template);
     let face = FaceOnTemplate {
@@ -26,10 +26,10 @@ pub fn template_rig() -> Rig {
 }
 
 /// The demo face with its registration.
-pub struct DemoFace {
-    pub mesh: Mesh,
-    pub registration: Registration,
-    pub rig: Arc<Rig>,
+pub(crate) struct DemoFace {
+    pub(crate) mesh: Mesh,
+    pub(crate) registration: Registration,
+    pub(crate) rig: Arc<Rig>,
 }
 
 static DEMO: LazyLock<DemoFace> = LazyLock::new(|| {
@@ -52,12 +52,12 @@ static DEMO: LazyLock<DemoFace> = LazyLock::new(|| {
 });
 
 /// The demo face, registered and rigged once per test binary.
-pub fn demo() -> &'static DemoFace {
+pub(crate) fn demo() -> &'static DemoFace {
     &DEMO
 }
 
 /// A pose with some shapes on, by name.
-pub fn pose(rig: &Rig, shapes: &[(&str, f32)]) -> FacePose {
+pub(crate) fn pose(rig: &Rig, shapes: &[(&str, f32)]) -> FacePose {
     let mut pose = FacePose::neutral(rig.shape_names.len());
     for (name, weight) in shapes {
         let index = rig.shape_index(name).expect("a shape of the template");

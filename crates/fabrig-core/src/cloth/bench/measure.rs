@@ -10,16 +10,16 @@ use crate::cloth::{Cloth, ClothError, ClothOptions, Counters, FrameInput};
 /// A run of the scene.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// Wall time of [`Cloth::step`] for each frame, warm-up left out. [ms]
+    /// Wall time of [`Cloth::step`] for each frame, warm-up left out. (ms)
     pub frame_ms: Vec<f64>,
-    /// Positions of all nodes of all patches, frame by frame. [mm]
+    /// Positions of all nodes of all patches, frame by frame. (mm)
     pub frames: Vec<Vec<Point3<f64>>>,
     /// Guards that acted.
     pub counters: Counters,
 }
 
 impl Run {
-    /// The time that a share of the frames does not exceed, 0.5 for the median. [ms]
+    /// The time that a share of the frames does not exceed, 0.5 for the median. (ms)
     pub fn quantile_ms(&self, share: f64) -> f64 {
         let mut sorted = self.frame_ms.clone();
         sorted.sort_by(f64::total_cmp);
@@ -74,9 +74,9 @@ pub fn run(
 /// How far a run is from a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
-    /// Largest RMS over frames. [mm]
+    /// Largest RMS over frames. (mm)
     pub rms: f64,
-    /// Largest difference of any node in any frame. [mm]
+    /// Largest difference of any node in any frame. (mm)
     pub max: f64,
     /// `rms` over the reference's largest RMS displacement from rest.
     pub relative: f64,

@@ -11,7 +11,7 @@ use crate::cloth::{ClothAttachment, ClothPatch, GridShape, HeadMotion, Material,
 pub struct BenchScene {
     /// The patches.
     pub patches: Vec<ClothPatch>,
-    /// Displacement of every node of every patch at full weight. [mm]
+    /// Displacement of every node of every patch at full weight. (mm)
     poses: Vec<Vec<Vector3<f32>>>,
 }
 

@@ -19,13 +19,13 @@
 /// Fixed-point units per mm; a correction is exact to 2^-36 mm.
 const UNITS_PER_MM: f64 = (1_u64 << 36) as f64;
 
-/// Corrections are kept within this, so that a sum of 2^15 of them cannot overflow. [mm]
+/// Corrections are kept within this, so that a sum of 2^15 of them cannot overflow. (mm)
 const LARGEST: f64 = 4096.0;
 
 /// Where a node of a pair stands before pairs are projected.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Port {
-    /// Predicted displacement from the target. [mm]
+    /// Predicted displacement from the target. (mm)
     pub(crate) displacement: [f64; 3],
     /// Effective inverse mass. [1/mass]
     pub(crate) inv_mass: f64,
@@ -33,7 +33,7 @@ pub(crate) struct Port {
     pub(crate) pair_count: f64,
 }
 
-/// Correction of node a by its pair with b. [mm]
+/// Correction of node a by its pair with b. (mm)
 ///
 /// - `compliance`: 1/(k h_e^2) [1/mass]
 #[inline(always)]
@@ -49,7 +49,7 @@ pub(crate) struct OrderFreeSum {
 }
 
 impl OrderFreeSum {
-    /// Takes in one correction. [mm]
+    /// Takes in one correction. (mm)
     #[inline(always)]
     pub(crate) fn add(&mut self, correction: [f64; 3]) {
         for axis in 0..3 {
@@ -59,7 +59,7 @@ impl OrderFreeSum {
         }
     }
 
-    /// The sum. [mm]
+    /// The sum. (mm)
     #[inline(always)]
     pub(crate) fn total(&self) -> [f64; 3] {
         self.sum.map(|s| s as f64 / UNITS_PER_MM)

@@ -31,7 +31,7 @@ pub(crate) struct BendCompliance<R> {
 
 /// Projects one triple.
 ///
-/// - `a`, `b`, `c`: displacements from the targets, b between the others [mm]
+/// - `a`, `b`, `c`: displacements from the targets, b between the others (mm)
 /// - `w`: inverse masses [1/mass]
 ///
 /// Returns the multiplier: the corrections are `w_a`, `-2 w_b` and `w_c` times it [mm mass].
@@ -55,7 +55,7 @@ pub(crate) fn project_triple<R: Real>(
 
 /// Projects every triple of a grid.
 ///
-/// - `displacements` [mm], `inv_masses` [1/mass]: one per node
+/// - `displacements` (mm), `inv_masses` [1/mass]: one per node
 #[inline(always)]
 pub(crate) fn project_bend<R: Real>(
     triples: &[[u32; 3]],

@@ -11,7 +11,7 @@ use crate::cloth::lanes::Real;
 
 /// What damping adds to a node's effective mass, all of it drawing to `x_b`. [mass]
 ///
-/// - `rate`: c [1/s]
+/// - `rate`: c (1/s)
 #[inline(always)]
 pub(crate) fn damping_mass<R: Real>(mass: R, rate: R, h_e: R) -> R {
     mass * rate * h_e

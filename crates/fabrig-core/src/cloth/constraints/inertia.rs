@@ -16,17 +16,17 @@ use crate::cloth::lanes::{Real, Vec3};
 /// Acceleration of the head frame, splatted over the lanes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FrameForces<R> {
-    /// Gravity's difference to the standing gravity, less the linear acceleration. [mm/s^2]
+    /// Gravity's difference to the standing gravity, less the linear acceleration. (mm/s^2)
     pub(crate) uniform: Vec3<R>,
-    /// w. [rad/s]
+    /// w. (rad/s)
     pub(crate) angular_velocity: Vec3<R>,
-    /// w'. [rad/s^2]
+    /// w'. (rad/s^2)
     pub(crate) angular_acceleration: Vec3<R>,
 }
 
-/// Acceleration of one node in the head frame. [mm/s^2]
+/// Acceleration of one node in the head frame. (mm/s^2)
 ///
-/// - `r`: position [mm], `v`: velocity [mm/s], both in the head frame
+/// - `r`: position (mm), `v`: velocity (mm/s), both in the head frame
 #[inline(always)]
 pub(crate) fn frame_acceleration<R: Real>(
     forces: &FrameForces<R>,

@@ -20,7 +20,7 @@ use crate::cloth::lanes::Real;
 pub(crate) struct Magnet<R> {
     /// k. [mass/s^2]
     pub(crate) stiffness: R,
-    /// c_m. [1/s]
+    /// c_m. (1/s)
     pub(crate) damping: R,
 }
 

@@ -17,7 +17,7 @@ use crate::cloth::lanes::{Real, Vec3};
 
 /// Volume gained [mm^3], with its gradient by node [mm^2] written into `gradient`.
 ///
-/// - `targets`, `displacements`: one per node [mm]
+/// - `targets`, `displacements`: one per node (mm)
 #[inline(always)]
 pub(crate) fn swept_volume<R: Real>(
     cells: &[[u32; 4]],
@@ -50,7 +50,7 @@ pub(crate) fn swept_volume<R: Real>(
 
 /// Projects the volume of one patch.
 ///
-/// - `displacements` [mm], `inv_masses` [1/mass]: one per node
+/// - `displacements` (mm), `inv_masses` [1/mass]: one per node
 /// - `compliance`: 1/(k h_e^2) [mm^4/mass], infinite for no pressure
 /// - `gradient`: room for one vector per node
 #[inline(always)]

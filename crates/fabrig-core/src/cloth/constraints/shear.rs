@@ -11,10 +11,10 @@ use crate::cloth::lanes::{Real, Vec3};
 
 /// Projects one diagonal.
 ///
-/// - `a`, `b`: positions [mm]; `wa`, `wb`: inverse masses [1/mass]
-/// - `rest`: l [mm]; `compliance`: 1/(k h_e^2) [1/mass]
+/// - `a`, `b`: positions (mm); `wa`, `wb`: inverse masses [1/mass]
+/// - `rest`: l (mm); `compliance`: 1/(k h_e^2) [1/mass]
 ///
-/// Returns the corrections of a and b [mm]: zero for coincident points.
+/// Returns the corrections of a and b (mm): zero for coincident points.
 #[inline(always)]
 pub(crate) fn project_diagonal<R: Real>(
     a: Vec3<R>,
@@ -33,7 +33,7 @@ pub(crate) fn project_diagonal<R: Real>(
 
 /// Projects every diagonal of a grid.
 ///
-/// - `positions` [mm], `inv_masses` [1/mass]: one per node
+/// - `positions` (mm), `inv_masses` [1/mass]: one per node
 /// - `progress`: how far through the frame, 0 to 1
 #[inline(always)]
 pub(crate) fn project_shear<R: Real>(

@@ -16,10 +16,10 @@
 
 use crate::cloth::lanes::{Real, Vec3};
 
-/// Lengths below this are taken for this. [mm]
+/// Lengths below this are taken for this. (mm)
 const SHORTEST: f64 = 1e-12;
 
-/// Rest lengths of a set of edges over one frame. [mm]
+/// Rest lengths of a set of edges over one frame. (mm)
 #[derive(Debug, Clone)]
 pub(crate) struct RestLengths<R> {
     /// Length in the neutral shape.
@@ -97,12 +97,12 @@ pub(crate) struct StretchCompliance<R> {
 
 /// Projects one edge.
 ///
-/// - `a`, `b`: positions [mm]; `wa`, `wb`: inverse masses [1/mass]
-/// - `rest`: l [mm]
-/// - `resting`: a - b had both moved with their targets only [mm]; damping acts on the
+/// - `a`, `b`: positions (mm); `wa`, `wb`: inverse masses [1/mass]
+/// - `rest`: l (mm)
+/// - `resting`: a - b had both moved with their targets only (mm); damping acts on the
 ///   difference to it
 ///
-/// Returns the corrections of a and b [mm]: zero for coincident points, whose direction is
+/// Returns the corrections of a and b (mm): zero for coincident points, whose direction is
 /// undefined.
 #[inline(always)]
 pub(crate) fn project_edge<R: Real>(
@@ -129,7 +129,7 @@ pub(crate) fn project_edge<R: Real>(
 
 /// Projects every edge of a grid.
 ///
-/// - `positions`, `resting` [mm], `inv_masses` [1/mass]: one per node; see [`project_edge`]
+/// - `positions`, `resting` (mm), `inv_masses` [1/mass]: one per node; see [`project_edge`]
 /// - `progress`: how far through the frame, 0 to 1
 #[inline(always)]
 pub(crate) fn project_stretch<R: Real>(

@@ -24,7 +24,7 @@ pub(crate) struct Air<R> {
 
 /// Force on one cell. [g mm/s^2]
 ///
-/// - `area`: vector area [mm^2]; `wind`: air velocity relative to the cell [mm/s]
+/// - `area`: vector area [mm^2]; `wind`: air velocity relative to the cell (mm/s)
 #[inline(always)]
 pub(crate) fn cell_force<R: Real>(air: &Air<R>, area: Vec3<R>, wind: Vec3<R>) -> Vec3<R> {
     let zero = R::splat(0.0);
@@ -40,9 +40,9 @@ pub(crate) fn cell_force<R: Real>(air: &Air<R>, area: Vec3<R>, wind: Vec3<R>) ->
     (wind * air.drag + lift * air.lift) * (R::splat(0.5) * air.density * size * through)
 }
 
-/// Adds the wind's acceleration of every node to `accelerations`. [mm/s^2]
+/// Adds the wind's acceleration of every node to `accelerations`. (mm/s^2)
 ///
-/// - `positions` [mm], `velocities` [mm/s]: one per node; `wind`: air velocity [mm/s]
+/// - `positions` (mm), `velocities` (mm/s): one per node; `wind`: air velocity (mm/s)
 /// - `inv_node_mass`: one over the mass of a node in the air's units [1/g]
 #[inline(always)]
 pub(crate) fn add_wind<R: Real>(

@@ -9,17 +9,17 @@ use crate::cloth::report::Energies;
 /// One substep, the same for all groups.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Substep {
-    /// Duration. [s]
+    /// Duration. (s)
     pub(crate) h: f64,
-    /// Duration of the one before. [s]
+    /// Duration of the one before. (s)
     pub(crate) previous_h: f64,
     /// Progress through the frame before and after, 0 to 1.
     pub(crate) progress: [f64; 2],
-    /// Uniform acceleration. [mm/s^2]
+    /// Uniform acceleration. (mm/s^2)
     pub(crate) uniform: [f64; 3],
-    /// Angular velocity [rad/s] and acceleration [rad/s^2] of the head frame.
+    /// Angular velocity (rad/s) and acceleration (rad/s^2) of the head frame.
     pub(crate) angular: [[f64; 3]; 2],
-    /// Air velocity. [mm/s]
+    /// Air velocity. (mm/s)
     pub(crate) wind: [f64; 3],
 }
 

@@ -10,7 +10,7 @@ use crate::cloth::constraints::wind::Air;
 use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator};
 use crate::cloth::lanes::{Real, Vec3};
 
-/// Displacements further than this are taken for a failure. [mm]
+/// Displacements further than this are taken for a failure. (mm)
 pub(super) const FARTHEST: f64 = 1e5;
 
 /// An anchored node.
@@ -24,9 +24,9 @@ pub(super) struct Anchor {
     pub(super) stiffness: f64,
     /// Position at the end of the frame before. [mm, relative to the patch's centre]
     pub(super) start: [f64; 3],
-    /// Hermite segment of this frame: chord and slopes. [mm]
+    /// Hermite segment of this frame: chord and slopes. (mm)
     pub(super) segment: [[f64; 3]; 3],
-    /// Velocity at the end of the frame, if known. [mm/s]
+    /// Velocity at the end of the frame, if known. (mm/s)
     pub(super) velocity: Option<[f64; 3]>,
 }
 
@@ -77,29 +77,29 @@ pub(crate) struct Group<R> {
     pub(super) previous_displacements: Vec<Vec3<R>>,
     pub(super) velocities: Vec<Vec3<R>>,
     pub(super) previous_velocities: Vec<Vec3<R>>,
-    /// How far the targets moved in the last substep. [mm]
+    /// How far the targets moved in the last substep. (mm)
     pub(super) target_steps: Vec<Vec3<R>>,
 
-    /// Targets at the start of the frame, relative to the centre. [mm]
+    /// Targets at the start of the frame, relative to the centre. (mm)
     pub(super) starts: Vec<Vec3<R>>,
-    /// Hermite segments: chord, slope at the start and at the end, times dt. [mm]
+    /// Hermite segments: chord, slope at the start and at the end, times dt. (mm)
     pub(super) chords: Vec<Vec3<R>>,
     pub(super) start_slopes: Vec<Vec3<R>>,
     pub(super) end_slopes: Vec<Vec3<R>>,
-    /// Targets at the end of the frame, relative to the centre. [mm]
+    /// Targets at the end of the frame, relative to the centre. (mm)
     pub(super) ends: Vec<Vec3<R>>,
-    /// Velocities of the targets at the end of the frame. [mm/s]
+    /// Velocities of the targets at the end of the frame. (mm/s)
     pub(super) end_velocities: Vec<Vec3<R>>,
     /// Targets at the end of the frame as given. [mm, head frame]
     pub(super) end_positions: Vec<Vec<Point3<f32>>>,
 
-    /// Targets at the end of the substep, relative to the centre. [mm]
+    /// Targets at the end of the substep, relative to the centre. (mm)
     pub(super) targets: Vec<Vec3<R>>,
-    /// Displacements, then positions, that are being solved for. [mm]
+    /// Displacements, then positions, that are being solved for. (mm)
     pub(super) solution: Vec<Vec3<R>>,
-    /// x_b - X. [mm]
+    /// x_b - X. (mm)
     pub(super) past: Vec<Vec3<R>>,
-    /// X + u_b. [mm]
+    /// X + u_b. (mm)
     pub(super) resting: Vec<Vec3<R>>,
     pub(super) inv_masses: Vec<R>,
     pub(super) accelerations: Vec<Vec3<R>>,
@@ -271,7 +271,7 @@ pub(super) fn relative(p: &Point3<f32>, center: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| f64::from(p[axis]) - center[axis])
 }
 
-/// Mean length of the grid's edges. [mm]
+/// Mean length of the grid's edges. (mm)
 fn mean_edge<R: Real>(edges: &[[u32; 2]], positions: &[Vec3<R>]) -> R {
     let mut sum = R::splat(0.0);
     for &[i, j] in edges {

@@ -109,7 +109,7 @@ pub(super) fn hold(cloth: &mut Cloth, targets: &[PatchMotion], frames: usize) ->
     last
 }
 
-/// Root mean square distance of a patch to positions. [mm]
+/// Root mean square distance of a patch to positions. (mm)
 pub(super) fn rms(cloth: &Cloth, patch: usize, to: &[Point3<f32>]) -> f64 {
     let sum: f64 = cloth
         .positions(patch)

@@ -29,7 +29,7 @@ use crate::{Point, Vector};
 pub struct FaceList {
     /// Source vertex at the front of the neck cut.
     neck_vertex: u32,
-    /// Length of one source unit. [mm]
+    /// Length of one source unit. (mm)
     millimetres_per_unit: f64,
     /// The faces by name.
     faces: BTreeMap<String, FaceRecipe>,
@@ -43,9 +43,9 @@ struct FaceRecipe {
     skin_vertex_count: usize,
     /// Edge steps of mouth and socket lining kept behind lips and lids.
     rim: u32,
-    /// Length of one unit of the face. [mm]
+    /// Length of one unit of the face. (mm)
     unit_mm: f64,
-    /// Turns about x, then y, then z. [degrees]
+    /// Turns about x, then y, then z. (degrees)
     turn_degrees: [f64; 3],
     /// Where the middle between the eyes goes, in the face's unit.
     place: [f64; 3],

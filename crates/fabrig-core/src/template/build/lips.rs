@@ -35,7 +35,7 @@ pub(super) struct Lips<'a> {
 /// Which vertices belong to what, by name of their region.
 pub(super) struct LipVertices<'a> {
     pub(super) region_of: &'a dyn Fn(u32) -> &'a str,
-    /// Linings are followed back to this z. [mm]
+    /// Linings are followed back to this z. (mm)
     pub(super) back: f64,
 }
 

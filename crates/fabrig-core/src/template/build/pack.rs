@@ -27,13 +27,13 @@ pub struct BuildReport {
     pub vertex_count: usize,
     /// Faces of the skin.
     pub face_count: usize,
-    /// Size of `geometry.bin`. [bytes]
+    /// Size of `geometry.bin`. (bytes)
     pub byte_count: usize,
     /// The jaw as fitted.
     pub jaw: JawHinge,
     /// The eyes as fitted.
     pub eyes: [EyeSocket; 2],
-    /// Largest movement of a vertex, shape by shape. [mm]
+    /// Largest movement of a vertex, shape by shape. (mm)
     pub amplitudes: Vec<(String, f64)>,
 }
 
@@ -164,7 +164,7 @@ pub fn build_geometry(
     Ok((bytes, report))
 }
 
-/// The identity in the head frame, every vertex of the source. [mm]
+/// The identity in the head frame, every vertex of the source. (mm)
 fn frame(
     data: &Path,
     base: &BaseMesh,
@@ -197,7 +197,7 @@ struct Shapes<'a> {
 
 impl Shapes<'_> {
     /// One delta per source vertex; a left shape is the mean of itself and its partner's
-    /// mirror image, a shape without sides is its own partner. [mm]
+    /// mirror image, a shape without sides is its own partner. (mm)
     fn symmetric(&self, name: &str) -> Result<Vec<Vector>, TemplateError> {
         let own = dense(name, &read_face_target(self.data, name)?, self.base)?;
         let other = match mirrored_name(name) {

@@ -88,7 +88,7 @@ pub(super) fn fit_sphere(points: &[Point]) -> Result<(Point, f64), TemplateError
     Ok((center, (s[3] + center.coords.norm_squared()).sqrt()))
 }
 
-/// The turn about +X nearest to a motion of points in the (y, z) plane: angle [rad] and the
+/// The turn about +X nearest to a motion of points in the (y, z) plane: angle (rad) and the
 /// point that stays where it is.
 pub(super) fn fit_hinge(rest: &[Point], moved: &[Point]) -> Result<(f64, Point), TemplateError> {
     let flat = |p: &Point| Vector2::new(p.y, p.z);
