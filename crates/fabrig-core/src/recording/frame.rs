@@ -9,7 +9,7 @@ pub const UNITS_PER_MM: f64 = 0.01;
 
 /// Rounding step of recorded positions in message units; a power of two leaves the low bits
 /// of the mantissa zero. [dm]
-pub(super) const POSITION_STEP: f64 = 1.0 / 16_384.0;
+pub(super) const POSITION_STEP: f64 = 1.0 / 8192.0;
 /// Rounding step of recorded normals.
 pub(super) const NORMAL_STEP: f32 = 1.0 / 64.0;
 
@@ -84,7 +84,8 @@ pub struct RecordingOptions {
     pub patches_hz: f64,
     /// Rate of both point clouds, 0 for none. (1/s)
     pub points_hz: f64,
-    /// Size at which a chunk is closed. [bytes before compression]
+    /// Size at which a chunk is closed; what does not change from frame to frame is stored
+    /// once a chunk. [bytes before compression]
     pub chunk_bytes: u64,
     /// Simulated time after which what is written is made safe against a crash. (s)
     pub flush_secs: f64,
@@ -95,8 +96,8 @@ impl Default for RecordingOptions {
         Self {
             skin_hz: 30.0,
             patches_hz: 30.0,
-            points_hz: 30.0,
-            chunk_bytes: 8 << 20,
+            points_hz: 10.0,
+            chunk_bytes: 64 << 20,
             flush_secs: 0.5,
         }
     }

@@ -1,27 +1,22 @@
 //! The writer: frames in, one MCAP file out.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, Compression, WriteOptions, Writer};
 use nalgebra::Point3;
 use prost::Message;
 
+use super::container::ContainerWriter;
 use super::encode::{SurfaceEncoder, series, transforms};
-use super::frame::{field_name, stride, topics};
+use super::frame::{POSITION_STEP, UNITS_PER_MM, field_name, stride, topics};
 use super::messages::{Log, timestamp};
 use super::schema::{foxglove_descriptors, series_descriptors};
 use super::{
     Frame, LogEvent, LogLevel, RecordingError, RecordingInfo, RecordingOptions, RecordingReport,
     SurfaceInfo, TopicReport, foxglove_layout,
 };
-
-/// zstd level of the chunks.
-const COMPRESSION_LEVEL: u32 = 3;
 
 /// One topic of the file being written.
 struct Channel {
@@ -38,7 +33,7 @@ struct Channel {
 /// properly and leaves it there if it has frames; a killed process leaves a partial file of
 /// which all flushed chunks can be read with [`super::RecordingReader::with_recovery`].
 pub struct McapRecorder {
-    writer: Option<Writer<BufWriter<File>>>,
+    writer: Option<ContainerWriter<BufWriter<File>>>,
     path: PathBuf,
     partial_path: PathBuf,
     info: RecordingInfo,
@@ -71,19 +66,23 @@ impl McapRecorder {
             path: partial_path.clone(),
             source,
         })?;
-        let writer = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            .compression_level(COMPRESSION_LEVEL)
-            // Worker threads change how zstd cuts its blocks; equal inputs give equal bytes.
-            .compression_threads(0)
-            .chunk_size(Some(options.chunk_bytes))
-            .library(concat!("fabrig/", env!("CARGO_PKG_VERSION")))
-            .create(BufWriter::with_capacity(1 << 20, file));
+        let skin = SurfaceEncoder::new(std::slice::from_ref(&info.skin));
+        let patches = SurfaceEncoder::new(&info.patches);
+        let parts = SurfaceEncoder::new(&info.parts);
+        let writer = ContainerWriter::new(
+            BufWriter::with_capacity(1 << 20, file),
+            concat!("fabrig/", env!("CARGO_PKG_VERSION")),
+            options.chunk_bytes,
+            [&skin, &patches, &parts]
+                .map(SurfaceEncoder::frame_bytes)
+                .iter()
+                .sum(),
+        );
         let mut recorder = Self {
             writer: None,
-            skin: SurfaceEncoder::new(std::slice::from_ref(&info.skin)),
-            patches: SurfaceEncoder::new(&info.patches),
-            parts: SurfaceEncoder::new(&info.parts),
+            skin,
+            patches,
+            parts,
             path,
             partial_path,
             info,
@@ -92,7 +91,7 @@ impl McapRecorder {
             frames: 0,
             last_flush_nanos: 0,
         };
-        recorder.writer = Some(writer.map_err(|e| recorder.write_error(e))?);
+        recorder.writer = Some(writer.map_err(|e| recorder.io_error("write", e))?);
         recorder.open_topics()?;
         Ok(recorder)
     }
@@ -123,23 +122,17 @@ impl McapRecorder {
         let metadata = self.metadata();
         let layout = foxglove_layout(&self.info).into_bytes();
         let opened = self.with_writer(|writer| {
-            writer.write_metadata(&metadata)?;
-            writer.attach(&Attachment {
-                log_time: 0,
-                create_time: 0,
-                name: "fabrig.foxglove.json".to_owned(),
-                media_type: "application/json".to_owned(),
-                data: Cow::Owned(layout),
-            })?;
+            writer.add_metadata("fabrig", &metadata)?;
+            writer.attach("fabrig.foxglove.json", "application/json", &layout)?;
             let mut channels = Vec::new();
             for (topic, schema, descriptors) in plan {
-                let schema = writer.add_schema(schema, "protobuf", descriptors)?;
+                let schema = writer.add_schema(schema, descriptors)?;
                 // Viewers' helpers read the plotted names here without decoding the schema.
                 let mut metadata = BTreeMap::new();
                 if let Some((_, names)) = series.iter().find(|(t, _)| *t == topic) {
                     metadata.insert("fields".to_owned(), names.clone());
                 }
-                let id = writer.add_channel(schema, topic, "protobuf", &metadata)?;
+                let id = writer.add_channel(schema, topic, &metadata)?;
                 channels.push(Channel {
                     id,
                     topic,
@@ -153,7 +146,7 @@ impl McapRecorder {
         Ok(())
     }
 
-    fn metadata(&self) -> Metadata {
+    fn metadata(&self) -> BTreeMap<String, String> {
         let info = &self.info;
         let mut metadata: BTreeMap<String, String> = info.extra.iter().cloned().collect();
         for (key, value) in [
@@ -163,14 +156,14 @@ impl McapRecorder {
             ("seed", info.seed.to_string()),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
             ("units", "decimetre".to_owned()),
-            ("position_rounding_um", "6.1".to_owned()),
+            (
+                "position_rounding_um",
+                format!("{:.1}", POSITION_STEP / UNITS_PER_MM * 1e3),
+            ),
         ] {
             metadata.insert(key.to_owned(), value);
         }
-        Metadata {
-            name: "fabrig".to_owned(),
-            metadata,
-        }
+        metadata
     }
 
     /// Simulated time of the next frame. (ns)
@@ -207,15 +200,15 @@ impl McapRecorder {
             &transforms(now, &frame.head).encode_to_vec(),
         )?;
         if skin_due {
-            let scene = self.skin.scene(now, &[frame.skin]).encode_to_vec();
+            let scene = self.skin.scene(now, &[frame.skin]);
             self.send(topics::SKIN, now, &scene)?;
             if !frame.parts.is_empty() {
-                let scene = self.parts.scene(now, frame.parts).encode_to_vec();
+                let scene = self.parts.scene(now, frame.parts);
                 self.send(topics::PARTS, now, &scene)?;
             }
         }
         if patches_due && !frame.patches.is_empty() {
-            let scene = self.patches.scene(now, frame.patches).encode_to_vec();
+            let scene = self.patches.scene(now, frame.patches);
             self.send(topics::PATCHES, now, &scene)?;
         }
         if points_due {
@@ -339,14 +332,11 @@ impl McapRecorder {
             message: format!("end after {} frames", self.frames),
         };
         self.log(self.log_time_nanos(), &event)?;
-        self.with_writer(|writer| writer.finish().map(|_| ()))?;
-        if let Some(writer) = self.writer.take() {
-            let mut buffered = writer.into_inner();
-            let flushed = buffered
-                .flush()
-                .and_then(|()| buffered.get_ref().sync_all());
-            flushed.map_err(|source| self.io_error("write", source))?;
-        }
+        self.with_writer(|writer| {
+            writer.finish()?;
+            writer.get_ref().get_ref().sync_all()
+        })?;
+        self.writer = None;
         Ok(())
     }
 
@@ -355,40 +345,24 @@ impl McapRecorder {
             return Ok(());
         };
         let channel = &mut self.channels[index];
-        let header = MessageHeader {
-            channel_id: channel.id,
-            sequence: channel.messages as u32,
-            log_time: now,
-            publish_time: now,
-        };
+        let (id, sequence) = (channel.id, channel.messages as u32);
         channel.messages += 1;
         channel.raw_bytes += data.len() as u64;
-        self.with_writer(|writer| writer.write_to_known_channel(&header, data))
+        self.with_writer(|writer| writer.message(id, sequence, now, data))
     }
 
     fn with_writer<T>(
         &mut self,
-        act: impl FnOnce(&mut Writer<BufWriter<File>>) -> mcap::McapResult<T>,
+        act: impl FnOnce(&mut ContainerWriter<BufWriter<File>>) -> io::Result<T>,
     ) -> Result<T, RecordingError> {
         let result = match &mut self.writer {
             Some(writer) => act(writer),
-            None => Err(mcap::McapError::AttemptedWriteAfterFailure),
+            None => Err(io::Error::other("the recording is closed")),
         };
-        result.map_err(|error| self.write_error(error))
+        result.map_err(|error| self.io_error("write", error))
     }
 
-    fn write_error(&self, error: mcap::McapError) -> RecordingError {
-        match error {
-            mcap::McapError::Io(source) => self.io_error("write", source),
-            source => RecordingError::Container {
-                path: self.partial_path.clone(),
-                frames: self.frames as usize,
-                source,
-            },
-        }
-    }
-
-    fn io_error(&self, action: &'static str, source: std::io::Error) -> RecordingError {
+    fn io_error(&self, action: &'static str, source: io::Error) -> RecordingError {
         RecordingError::Io {
             action,
             path: self.partial_path.clone(),

@@ -8,6 +8,15 @@
 use prost::Message;
 use prost_types::{Duration, Timestamp};
 
+/// Field numbers of what the recorder encodes by hand.
+pub(super) mod tag {
+    pub(in super::super) const SCENE_ENTITIES: u32 = 2;
+    pub(in super::super) const ENTITY_TIMESTAMP: u32 = 1;
+    pub(in super::super) const ENTITY_TRIANGLES: u32 = 12;
+    pub(in super::super) const LIST_POINTS: u32 = 2;
+    pub(in super::super) const LIST_NORMALS: u32 = 1001;
+}
+
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Vector3 {
     #[prost(double, tag = "1")]

@@ -7,8 +7,9 @@
 //! # Units, axes and rounding
 //!
 //! Messages carry **decimetres**, because viewers start with a camera some metres away and cut
-//! off what is nearer than half a unit. Positions are rounded to 2^-14 dm = **6.1 um** and
-//! normals to 1/64: neither can be seen, and both halve the file. Geometry stands in the frame
+//! off what is nearer than half a unit. Positions are rounded to 2^-13 dm = **12.2 um** and
+//! normals to 1/64: neither can be seen, and both halve the file. Topology goes along
+//! with every mesh, as the viewers want it, and is stored once a chunk. Geometry stands in the frame
 //! `head` (+Y up); `/tf` places `head` in `rig`, and `rig` in `world`, which has +Z up as the
 //! viewers want it.
 //!
@@ -22,6 +23,7 @@
 //! A recording is a record of what moved, not an exchange format: it has neither texture
 //! coordinates nor the rig. Viewers read the shaded meshes at 30 frames a second or less.
 
+mod container;
 mod encode;
 mod error;
 mod frame;
