@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-STEP_UNITS = 2.0**-14
+STEP_UNITS = 2.0**-13
 MESHES = ["/rig/skin", "/rig/parts", "/rig/patches"]
 CLOUDS = {"/rig/skin": "/points/skin", "/rig/patches": "/points/patches"}
 
@@ -99,7 +99,8 @@ def test_no_topic_is_faster_than_viewers_like(messages):
         if topic != "/log":
             assert len(series) / (end * 1e-9) <= 60.0, topic
     for topic in MESHES:
-        assert len(messages[topic]) / (end * 1e-9) <= 30.0, topic
+        # An odd number of frames at 60 a second has a mesh on both its ends.
+        assert (len(messages[topic]) - 1) / (end * 1e-9) <= 30.0, topic
 
 
 @pytest.mark.parametrize("topic", MESHES)
