@@ -19,7 +19,7 @@ const COMPRESSION_LEVEL: i32 = 1;
 /// How far zstd looks back: 16 MiB, or more where a frame is larger, up to what decoders take
 /// without being asked. It also sizes the table of distant matches.
 const WINDOW_LOG: std::ops::RangeInclusive<u32> = 24..=27;
-/// Shortest distant match. [bytes]
+/// Shortest distant match. (bytes)
 const DISTANT_MATCH: u32 = 32;
 
 /// Kinds of records.
@@ -83,7 +83,7 @@ impl Content {
 #[derive(Default)]
 struct Chunk {
     records: Vec<u8>,
-    /// First and last log time. [ns]
+    /// First and last log time. (ns)
     times: Option<(u64, u64)>,
     /// Log time and offset of every message, by channel.
     index: BTreeMap<u16, Vec<(u64, u64)>>,
@@ -101,12 +101,12 @@ struct Counts {
 /// Writes an MCAP file from its start to its end; nothing is sought or read back.
 pub(super) struct ContainerWriter<W> {
     out: W,
-    /// Bytes written. [bytes]
+    /// Bytes written. (bytes)
     position: u64,
     data_crc: crc32fast::Hasher,
     compressor: Compressor<'static>,
     chunk: Chunk,
-    /// Size at which a chunk is closed. [bytes before compression]
+    /// Size at which a chunk is closed. (bytes before compression)
     chunk_bytes: usize,
     schemas: Vec<Content>,
     channels: Vec<Content>,

@@ -45,13 +45,13 @@ impl SurfaceEncoder {
         }
     }
 
-    /// Size of [`Self::scene`] and [`Self::cloud`] together. [bytes]
+    /// Size of [`Self::scene`] and [`Self::cloud`] together. (bytes)
     pub(super) fn frame_bytes(&self) -> usize {
         let vertices: usize = self.surfaces.iter().map(|s| s.info.vertex_count).sum();
         self.scene_bytes() + vertices * CLOUD_STRIDE
     }
 
-    /// Size of [`Self::scene`] without a few bytes of framing. [bytes]
+    /// Size of [`Self::scene`] without a few bytes of framing. (bytes)
     fn scene_bytes(&self) -> usize {
         let surfaces = self.surfaces.iter();
         surfaces
@@ -59,7 +59,7 @@ impl SurfaceEncoder {
             .sum()
     }
 
-    /// All surfaces as one scene update; `positions` fit the surfaces. [mm]
+    /// All surfaces as one scene update; `positions` fit the surfaces. (mm)
     pub(super) fn scene(&self, nanos: u64, positions: &[&[Point3<f32>]]) -> Vec<u8> {
         let mut scene = Vec::with_capacity(self.scene_bytes() + 256 * (1 + self.surfaces.len()));
         for (surface, positions) in self.surfaces.iter().zip(positions) {

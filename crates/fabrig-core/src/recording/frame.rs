@@ -8,7 +8,7 @@ use super::RecordingError;
 pub const UNITS_PER_MM: f64 = 0.01;
 
 /// Rounding step of recorded positions in message units; a power of two leaves the low bits
-/// of the mantissa zero. [dm]
+/// of the mantissa zero. (dm)
 pub(super) const POSITION_STEP: f64 = 1.0 / 8192.0;
 /// Rounding step of recorded normals.
 pub(super) const NORMAL_STEP: f32 = 1.0 / 64.0;
@@ -85,7 +85,7 @@ pub struct RecordingOptions {
     /// Rate of both point clouds, 0 for none. (1/s)
     pub points_hz: f64,
     /// Size at which a chunk is closed; what does not change from frame to frame is stored
-    /// once a chunk. [bytes before compression]
+    /// once a chunk. (bytes before compression)
     pub chunk_bytes: u64,
     /// Simulated time after which what is written is made safe against a crash. (s)
     pub flush_secs: f64,
