@@ -36,6 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         color,
         vertex_count: count,
         triangles: triangles.to_vec(),
+        vertex_colors: Vec::new(),
     };
     let patch_triangles = grid_triangles(grid);
     let patches = patch_names.iter().enumerate().map(|(i, name)| {

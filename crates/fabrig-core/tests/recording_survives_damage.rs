@@ -25,6 +25,7 @@ fn surface(name: &str, color: [u8; 4]) -> SurfaceInfo {
         color,
         vertex_count: (SIDE * SIDE) as usize,
         triangles,
+        vertex_colors: Vec::new(),
     }
 }
 
@@ -39,7 +40,10 @@ fn info() -> RecordingInfo {
             surface("zygomaticus_major_l", [200, 40, 40, 255]),
             surface("zygomaticus_major_r", [40, 40, 200, 128]),
         ],
-        parts: vec![surface("eye_l", [240; 4])],
+        parts: vec![SurfaceInfo {
+            vertex_colors: (0..SIDE * SIDE).map(|v| [v as u8, 9, 80, 255]).collect(),
+            ..surface("eye_l", [240; 4])
+        }],
         weight_names: vec!["jawOpen".to_owned(), "mouthSmileLeft".to_owned()],
         stat_names: vec!["step_ms".to_owned()],
         extra: Vec::new(),
@@ -137,6 +141,7 @@ fn what_is_recorded_comes_back_to_its_rounding() {
     assert!(frame.head.rotation.angle_to(&head(20).rotation) < 1e-9);
     let names: Vec<_> = frame.patches.iter().map(|p| p.info.clone()).collect();
     assert_eq!(names, info().patches);
+    assert_eq!(frame.parts[0].info, info().parts[0]);
     let skin = frame.skin.as_ref().expect("skin");
     assert_eq!(skin.info, info().skin);
     for (surface, truth) in [

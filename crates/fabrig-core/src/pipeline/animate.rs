@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::TimeStatistics;
 use crate::Error;
+use crate::Vector;
 use crate::cloth::Counters;
 use crate::motion::{Clip, ClipNotes};
 use crate::recording::{
@@ -322,12 +323,14 @@ impl Surfaces {
             }
         }
         let parts = rig.parts.iter().zip(part_triangles);
+        let rest = rig.skin_at_rest();
         Self {
             skin: SurfaceInfo {
                 name: "skin".to_owned(),
                 color: SKIN_COLOR,
                 vertex_count,
                 triangles: skin_triangles,
+                vertex_colors: Vec::new(),
             },
             patches: rig
                 .patches
@@ -344,6 +347,7 @@ impl Surfaces {
                             .iter()
                             .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
                             .collect(),
+                        vertex_colors: Vec::new(),
                     }
                 })
                 .collect(),
@@ -353,6 +357,11 @@ impl Surfaces {
                     color: part_color(&part.name),
                     vertex_count: part.vertices.len(),
                     triangles,
+                    vertex_colors: if part.name.starts_with("eye") {
+                        eye_colors(rig, &rest, &part.vertices)
+                    } else {
+                        Vec::new()
+                    },
                 })
                 .collect(),
             part_vertices: rig.parts.iter().map(|p| p.vertices.clone()).collect(),
@@ -370,6 +379,25 @@ fn part_color(name: &str) -> [u8; 4] {
     } else {
         [150, 140, 132, 255]
     }
+}
+
+/// White, iris and pupil of an eyeball that looks straight ahead at rest. The iris of an adult
+/// spans about 29 degrees to each side of the line of sight, the pupil about 10.
+fn eye_colors(rig: &Rig, rest: &[Point3<f32>], vertices: &[u32]) -> Vec<[u8; 4]> {
+    let rest = |v: &u32| rest[*v as usize].cast::<f64>();
+    let mean = vertices.iter().map(|v| rest(v).coords).sum::<Vector>() / vertices.len() as f64;
+    let [a, b] = rig.eyes.each_ref().map(|eye| eye.center);
+    let is_first = (a.coords - mean).norm() < (b.coords - mean).norm();
+    let center = if is_first { a } else { b };
+    let color = |v: &u32| {
+        let angle = (rest(v) - center).angle(&Vector::z()).to_degrees();
+        match angle {
+            ..10.0 => [14, 14, 16, 255],
+            ..29.0 => [86, 116, 128, 255],
+            _ => part_color("eye"),
+        }
+    };
+    vertices.iter().map(color).collect()
 }
 
 fn recording_info(

@@ -116,12 +116,11 @@ const NORMAL_BYTES: usize = 18;
 impl EncodedSurface {
     /// `first` counts the vertices of the message before this surface.
     fn new(info: &SurfaceInfo, first: u32) -> Self {
-        let [r, g, b, a] = info.color.map(|c| f64::from(c) / 255.0);
         let list = wire::TriangleList {
             pose: Some(identity_pose()),
             points: Vec::new(),
-            color: Some(wire::Color { r, g, b, a }),
-            colors: Vec::new(),
+            color: Some(color(&info.color)),
+            colors: info.vertex_colors.iter().map(color).collect(),
             indices: info.triangles.iter().flatten().copied().collect(),
             mesh_triangles: info
                 .triangles
@@ -133,7 +132,10 @@ impl EncodedSurface {
                 })
                 .collect(),
             mesh_normals: Vec::new(),
-            mesh_colors: vec![u32::from_be_bytes(info.color); info.vertex_count],
+            mesh_colors: (0..info.vertex_count)
+                .map(|v| info.vertex_colors.get(v).unwrap_or(&info.color))
+                .map(|color| u32::from_be_bytes(*color))
+                .collect(),
         };
         let entity = wire::SceneEntity {
             timestamp: None,
@@ -254,6 +256,11 @@ fn transform(nanos: u64, parent: &str, child: &str, pose: &Isometry3<f64>) -> wi
     }
 }
 
+fn color(srgb: &[u8; 4]) -> wire::Color {
+    let [r, g, b, a] = srgb.map(|c| f64::from(c) / 255.0);
+    wire::Color { r, g, b, a }
+}
+
 fn identity_pose() -> wire::Pose {
     wire::Pose {
         position: Some(wire::Vector3::default()),
@@ -304,6 +311,7 @@ mod tests {
             color: [10, 20, 30, 255],
             vertex_count: 3,
             triangles: vec![[0, 1, 2]],
+            vertex_colors: Vec::new(),
         };
         let positions = [
             Point3::new(0.0f32, 0.0, 0.0),

@@ -46,6 +46,8 @@ pub struct SurfaceInfo {
     pub vertex_count: usize,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// sRGB and opacity of every vertex; empty where all have [`Self::color`].
+    pub vertex_colors: Vec<[u8; 4]>,
 }
 
 /// What a recording is opened with: everything that does not change from frame to frame.
@@ -178,6 +180,13 @@ impl RecordingInfo {
             .chain(&self.parts);
         for surface in surfaces {
             let count = surface.vertex_count;
+            let colors = surface.vertex_colors.len();
+            if colors != 0 && colors != count {
+                return refuse(format!(
+                    "`{}` has {colors} colours for {count} vertices",
+                    surface.name
+                ));
+            }
             for (i, t) in surface.triangles.iter().enumerate() {
                 if let Some(v) = t.iter().find(|&&v| v as usize >= count) {
                     return refuse(format!(

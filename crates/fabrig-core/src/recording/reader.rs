@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use prost::Message;
 
 use super::frame::{UNITS_PER_MM, topics};
-use super::messages::{FrameTransforms, SceneUpdate};
+use super::messages::{Color, FrameTransforms, SceneUpdate};
 use super::{RecordingError, SurfaceInfo};
 
 /// A surface at one instant.
@@ -295,15 +295,18 @@ fn surfaces_of(scene: SceneUpdate) -> Result<Vec<RecordedSurface>, String> {
             if let Some(v) = list.indices.iter().find(|&&v| v as usize >= count) {
                 return Err(format!("`{}` references vertex {v} of {count}", entity.id));
             }
-            let color = list.color.unwrap_or_default();
-            let color = [color.r, color.g, color.b, color.a]
-                .map(|c| (c * 255.0).round().clamp(0.0, 255.0) as u8);
+            let srgb = |color: &Color| {
+                [color.r, color.g, color.b, color.a]
+                    .map(|c| (c * 255.0).round().clamp(0.0, 255.0) as u8)
+            };
+            let color = srgb(&list.color.unwrap_or_default());
             surfaces.push(RecordedSurface {
                 info: SurfaceInfo {
                     name: entity.id.clone(),
                     color,
                     vertex_count: count,
                     triangles,
+                    vertex_colors: list.colors.iter().map(srgb).collect(),
                 },
                 positions: list
                     .points

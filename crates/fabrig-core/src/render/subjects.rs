@@ -135,6 +135,7 @@ mod tests {
                 color: [255; 4],
                 vertex_count: positions.len(),
                 triangles: Vec::new(),
+                vertex_colors: Vec::new(),
             },
             positions,
         };
