@@ -1,6 +1,7 @@
 //! From a face on the template to a rig.
 
 use nalgebra::Similarity3;
+use rayon::prelude::*;
 
 use crate::anatomy::{self, Patch, Resolution};
 use crate::mesh::{Mesh, SurfacePoint};
@@ -9,13 +10,13 @@ use crate::rig::parts::name_parts;
 use crate::rig::sockets::{fit_eyes, fit_hinge};
 use crate::rig::{Rig, RigError, RigJaw, RigPatch};
 use crate::skin::{
-    CandidateFinder, FitOptions, NodeAffine, NodeFrames, Pose, SkinBinding, TemplateWeights,
-    fit_to_shapes,
+    CandidateFinder, FitOptions, NodeAffine, NodeFrames, Pose, SkinBinding, SmoothInterpolation,
+    TemplateWeights, fit_to_shapes,
 };
 use crate::template::{EyeSocket, JawHinge, Template};
 use crate::transfer::{
-    EyeShapes, JawField, JawMode, JawShapes, LidClosing, LidField, MuscleShape, PatchTransfer,
-    ShapeSampler, ShapeWeights, muscle_shapes, size_ratio, smoothed_normals,
+    AlphaField, EyeShapes, JawField, JawMode, JawShapes, LidClosing, LidField, MuscleShape,
+    PatchTransfer, ShapeSampler, ShapeWeights, muscle_shapes, size_ratio, smoothed_normals,
 };
 use crate::{Point, Vector};
 
@@ -153,7 +154,7 @@ pub fn build(
     let node_counts = patches.iter().map(|p| p.neutral.len() as u32).collect();
     let binding = SkinBinding::bind(
         &weights,
-        &template.skin.triangles(),
+        &SmoothInterpolation::new(template),
         &skin_places,
         node_counts,
     )?;
@@ -242,32 +243,57 @@ fn transfer_all(
     let jaw_shapes = JawShapes::of(template);
     let closing = LidClosing::new(template, positions);
     let sampler = ShapeSampler::new(template);
+    let sizes: Vec<f64> = template_patches
+        .iter()
+        .zip(patches)
+        .map(|(on_template, on_face)| {
+            let chart = &on_face.chart;
+            size_ratio(
+                chart.kind,
+                chart.grid,
+                &on_template.neutral,
+                &on_face.neutral,
+            )
+        })
+        .collect();
+    let field = AlphaField::new(template, patches, &sizes);
+    let corrections = closing.corrections(field.by_vertex());
     template_patches
         .iter()
         .zip(patches)
         .zip(shapes)
-        .map(|((on_template, on_face), mut shapes)| {
+        .zip(sizes)
+        .map(|(((on_template, on_face), mut shapes), alpha)| {
             let chart = &on_face.chart;
             let (from, to) = (&on_template.neutral, &on_face.neutral);
-            let alpha = size_ratio(chart.kind, chart.grid, from, to);
+            let alphas: Vec<f64> = chart.nodes.iter().map(|node| field.at(node)).collect();
+            let factors: Vec<f64> = alphas.iter().map(|a| a / alpha).collect();
             let deltas = |shape: Option<u32>| {
                 let shape = shape?;
                 let found = shapes.iter().find(|s| s.shape == shape)?;
                 Some(found.deltas.as_slice())
             };
-            let jaw = JawField::split(
+            let mut jaw = JawField::split(
                 &template.jaw,
                 from,
                 deltas(jaw_shapes.open),
                 deltas(jaw_shapes.close),
             );
-            let lids = LidField::new(from, &template.eyes, to, eyes, &shapes, alpha);
-            for (shape, corrections) in closing.corrections(alpha) {
-                let Some(muscle) = shapes.iter_mut().find(|s| s.shape == shape) else {
+            let lids = LidField::new(from, &template.eyes, to, eyes, &shapes, &alphas);
+            if let Some(jaw) = &mut jaw {
+                jaw.scale_residuals(&factors);
+            }
+            for shape in &mut shapes {
+                for (delta, factor) in shape.deltas.iter_mut().zip(&factors) {
+                    *delta *= *factor as f32;
+                }
+            }
+            for (shape, corrections) in &corrections {
+                let Some(muscle) = shapes.iter_mut().find(|s| s.shape == *shape) else {
                     continue;
                 };
                 for (delta, node) in muscle.deltas.iter_mut().zip(&chart.nodes) {
-                    let correction: Vector = sampler.blend(node, &corrections);
+                    let correction: Vector = sampler.blend(node, corrections);
                     *delta += (correction / alpha).cast::<f32>();
                 }
             }
@@ -304,7 +330,10 @@ fn fit_weights(
             })
             .collect(),
     };
-    let poses: Vec<Pose> = (0..template.shapes.len()).map(|s| poser.pose(s)).collect();
+    let poses: Vec<Pose> = (0..template.shapes.len())
+        .into_par_iter()
+        .map(|s| poser.pose(s))
+        .collect();
     fit_to_shapes(template, &normals, &finder, &poses, &options.fit)
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::SurfacePoint;
-use crate::skin::{SkinError, TemplateWeights};
+use crate::skin::{SkinError, SmoothInterpolation, TemplateWeights};
 
 /// Weights below this are dropped.
 const LEAST_WEIGHT: f32 = 1e-4;
@@ -19,7 +19,8 @@ pub struct SkinBinding {
     pub starts: Vec<u32>,
     /// Node of each entry, rising within a row.
     pub nodes: Vec<u32>,
-    /// Weight of each entry; a row sums to at most one, the rest is the skull's.
+    /// Weight of each entry; a row sums to about one at most, the rest is the
+    /// skull's.
     pub weights: Vec<f32>,
 }
 
@@ -28,14 +29,14 @@ impl SkinBinding {
     ///
     /// - `places`: for each user vertex its place on the template's topology, or `None` for
     ///   vertices that do not follow the patches
-    /// - `triangles`: of the template's skin
+    /// - `interpolation`: over the template's skin
     ///
     /// # Errors
     ///
     /// [`SkinError::TriangleOutOfRange`].
     pub fn bind(
         weights: &TemplateWeights,
-        triangles: &[[u32; 3]],
+        interpolation: &SmoothInterpolation<'_>,
         places: &[Option<SurfacePoint>],
         node_counts: Vec<u32>,
     ) -> Result<Self, SkinError> {
@@ -47,35 +48,31 @@ impl SkinBinding {
         };
         binding.starts.push(0);
         let mut row: Vec<(u32, f32)> = Vec::new();
+        let mut shares = Vec::new();
         for (vertex, place) in places.iter().enumerate() {
             row.clear();
             if let Some(place) = place {
-                let corners = triangles.get(place.triangle as usize).ok_or(
-                    SkinError::TriangleOutOfRange {
+                let triangle_count = interpolation.triangle_count();
+                if place.triangle as usize >= triangle_count {
+                    return Err(SkinError::TriangleOutOfRange {
                         vertex,
                         triangle: place.triangle,
-                        triangle_count: triangles.len(),
-                    },
-                )?;
-                for (&corner, share) in corners.iter().zip(place.barycentric) {
+                        triangle_count,
+                    });
+                }
+                interpolation.shares(place, &mut shares);
+                for &(v, share) in &shares {
                     let share = share as f32;
-                    let entries = &weights.by_vertex[corner as usize];
+                    let entries = &weights.by_vertex[v as usize];
                     row.extend(entries.iter().map(|&(node, w)| (node, share * w)));
                 }
             }
             row.sort_by_key(|entry| entry.0);
-            for &(node, weight) in &row {
-                if weight.abs() < LEAST_WEIGHT {
-                    continue;
-                }
-                let is_same = binding.nodes.len() > binding.starts[vertex] as usize
-                    && binding.nodes.last() == Some(&node);
-                match binding.weights.last_mut() {
-                    Some(last) if is_same => *last += weight,
-                    _ => {
-                        binding.nodes.push(node);
-                        binding.weights.push(weight);
-                    }
+            for same in row.chunk_by(|a, b| a.0 == b.0) {
+                let weight: f32 = same.iter().map(|entry| entry.1).sum();
+                if weight.abs() >= LEAST_WEIGHT {
+                    binding.nodes.push(same[0].0);
+                    binding.weights.push(weight);
                 }
             }
             binding.starts.push(binding.nodes.len() as u32);

@@ -99,7 +99,7 @@ pub fn fit_to_shapes(
         .collect();
     let mut weights: Vec<Vec<(u32, f32)>> = problems
         .par_iter()
-        .map(|p| p.solve(&p.prior, options.ridge))
+        .map(|p| p.solve(&p.prior, options.ridge, &[]))
         .collect();
     let topology = Topology::from_mesh(&template.skin);
     for _ in 0..options.smoothing_rounds {
@@ -108,7 +108,7 @@ pub fn fit_to_shapes(
             .enumerate()
             .map(|(v, problem)| {
                 let prior = neighbour_mean(template, &topology, v, problem, &weights);
-                problem.solve(&prior, options.ridge)
+                problem.solve(&prior, options.ridge, &weights[v])
             })
             .collect();
     }
@@ -169,7 +169,8 @@ impl Problem {
         }
     }
 
-    fn solve(&self, prior: &[f64], ridge: f64) -> Vec<(u32, f32)> {
+    /// - `last`: the answer of the round before, to start from
+    fn solve(&self, prior: &[f64], ridge: f64, last: &[(u32, f32)]) -> Vec<(u32, f32)> {
         let count = self.candidates.len();
         let mut normal = self.normal.clone();
         let mut rhs = self.rhs.clone();
@@ -177,7 +178,13 @@ impl Problem {
             normal[(i, i)] += ridge;
             rhs[i] += ridge * prior[i];
         }
-        let mut weights = solve_nonnegative(&normal, &rhs);
+        let mut start = DVector::zeros(count);
+        for &(node, weight) in last {
+            if let Ok(i) = self.candidates.binary_search_by_key(&node, |c| c.node) {
+                start[i] = f64::from(weight);
+            }
+        }
+        let mut weights = solve_nonnegative(&normal, &rhs, start);
         let total = weights.sum();
         if total > 1.0 {
             // Hold the sum at one by a stiff row, then exactly by scaling.
@@ -188,7 +195,8 @@ impl Problem {
                     normal[(i, j)] += stiff;
                 }
             }
-            weights = solve_nonnegative(&normal, &rhs);
+            let start = weights / total;
+            weights = solve_nonnegative(&normal, &rhs, start);
             let total = weights.sum();
             if total > 1.0 {
                 weights /= total;

@@ -21,6 +21,7 @@ mod deform;
 mod error;
 pub mod fit;
 mod frames;
+mod interpolation;
 pub mod kernel;
 mod nonnegative;
 
@@ -30,3 +31,4 @@ pub use deform::SkinDeformer;
 pub use error::SkinError;
 pub use fit::{FitOptions, Pose, TemplateWeights, fit_to_shapes};
 pub use frames::{NodeAffine, NodeFrames};
+pub use interpolation::SmoothInterpolation;

@@ -6,19 +6,25 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 ///
 /// Active sets after Lawson & Hanson 1974, on the normal equations; every round solves the
 /// free unknowns exactly, so the answer is exact up to rounding when it ends by itself, and
-/// feasible always.
-pub(super) fn solve_nonnegative(normal: &DMatrix<f64>, rhs: &DVector<f64>) -> DVector<f64> {
+/// feasible always. A feasible `start` near the answer saves rounds.
+pub(super) fn solve_nonnegative(
+    normal: &DMatrix<f64>,
+    rhs: &DVector<f64>,
+    start: DVector<f64>,
+) -> DVector<f64> {
     let count = rhs.len();
     let scale = (0..count).map(|i| normal[(i, i)]).fold(0.0, f64::max);
     let tolerance = 1e-10 * scale.max(f64::MIN_POSITIVE);
-    let mut weights = DVector::zeros(count);
-    let mut free: Vec<usize> = Vec::with_capacity(count);
+    let mut weights = start;
+    let mut free: Vec<usize> = (0..count).filter(|&i| weights[i] > 0.0).collect();
+    let mut is_started = !free.is_empty();
     for _ in 0..3 * count {
         let gradient = rhs - normal * &weights;
         let entering = (0..count)
             .filter(|i| !free.contains(i))
             .max_by(|&a, &b| gradient[a].total_cmp(&gradient[b]));
         match entering {
+            _ if is_started => is_started = false,
             Some(i) if gradient[i] > tolerance => free.push(i),
             _ => break,
         }
@@ -76,7 +82,7 @@ mod tests {
     fn an_inner_solution_is_the_linear_one() {
         let normal = DMatrix::from_row_slice(2, 2, &[2.0, 0.5, 0.5, 1.0]);
         let want = DVector::from_row_slice(&[0.3, 0.4]);
-        let got = solve_nonnegative(&normal, &(&normal * &want));
+        let got = solve_nonnegative(&normal, &(&normal * &want), DVector::zeros(2));
         assert!((got - want).norm() < 1e-10);
     }
 
@@ -92,7 +98,10 @@ mod tests {
             normal[(i, i)] += 1e-3;
         }
         let rhs = DVector::from_fn(count, |i, _| (i as f64 * 1.3).cos());
-        let w = solve_nonnegative(&normal, &rhs);
+        let cold = solve_nonnegative(&normal, &rhs, DVector::zeros(count));
+        let warm = solve_nonnegative(&normal, &rhs, DVector::from_element(count, 0.1));
+        assert!((&cold - warm).norm() < 1e-6);
+        let w = cold;
         let gradient = rhs - &normal * &w;
         for i in 0..count {
             assert!(w[i] >= 0.0);

@@ -77,23 +77,27 @@ impl<'a> LidClosing<'a> {
 
     /// What to add to `alpha * delta` of each blink so that the lids of this face meet.
     ///
+    /// - `alphas`: amplitude at each template vertex
+    ///
     /// Returns (shape index, one correction per template vertex (mm)).
-    pub fn corrections(&self, alpha: f64) -> Vec<(u32, Vec<Vector>)> {
+    pub fn corrections(&self, alphas: &[f64]) -> Vec<(u32, Vec<Vector>)> {
         self.eyes
             .iter()
-            .map(|eye| (eye.shape, self.correct(eye, alpha)))
+            .map(|eye| (eye.shape, self.correct(eye, alphas)))
             .collect()
     }
 
-    fn correct(&self, eye: &LidPair, alpha: f64) -> Vec<Vector> {
+    fn correct(&self, eye: &LidPair, alphas: &[f64]) -> Vec<Vector> {
         let rest = self.template.skin.positions();
         let mut upper_marks = Vec::with_capacity(eye.pairs.len());
         let mut lower_marks = Vec::with_capacity(eye.pairs.len());
         for &MarginPair { upper, lower } in &eye.pairs {
             let (du, dl) = (eye.deltas[upper], eye.deltas[lower]);
-            let left_open =
-                |at: &[Point], scale: f64| (at[upper] + scale * du) - (at[lower] + scale * dl);
-            let gap = left_open(self.positions, alpha) - left_open(rest, 1.0);
+            let left_open = |at: &[Point], scale_upper: f64, scale_lower: f64| {
+                (at[upper] + scale_upper * du) - (at[lower] + scale_lower * dl)
+            };
+            let gap =
+                left_open(self.positions, alphas[upper], alphas[lower]) - left_open(rest, 1.0, 1.0);
             let share = du.norm() / (du.norm() + dl.norm()).max(f64::EPSILON);
             upper_marks.push((upper, -share * gap));
             lower_marks.push((lower, (1.0 - share) * gap));

@@ -229,7 +229,7 @@ mod tests {
             Some(&shapes[0].deltas),
             Some(&shapes[1].deltas),
         );
-        let lids = LidField::new(&nodes, &eyes, &nodes, &eyes, &shapes, 1.0);
+        let lids = LidField::new(&nodes, &eyes, &nodes, &eyes, &shapes, &[1.0; 2]);
         Fixture {
             hinge,
             jaw_shapes: JawShapes {

@@ -136,6 +136,20 @@ impl JawField {
         }
         Some(field)
     }
+
+    /// Scales what the jaw does besides turning, node by node.
+    pub fn scale_residuals(&mut self, factors: &[f64]) {
+        let lists = [
+            &mut self.open_residual,
+            &mut self.close_residual,
+            &mut self.pair,
+        ];
+        for list in lists {
+            for (vector, factor) in list.iter_mut().zip(factors) {
+                *vector *= *factor as f32;
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -50,6 +50,7 @@ impl LidField {
     ///
     /// - `template_nodes`, `template_eyes`: the patch and eyes at rest on the template (mm)
     /// - `nodes`, `eyes`: the patch and centres of rotation at rest on this face (mm)
+    /// - `alphas`: amplitude at each node
     ///
     /// Returns `None` where there are none.
     pub fn new(
@@ -58,7 +59,7 @@ impl LidField {
         nodes: &[Point],
         eyes: &[EyeSocket; 2],
         shapes: &[MuscleShape],
-        alpha: f64,
+        alphas: &[f64],
     ) -> Option<Self> {
         let mut found = Vec::new();
         for (i, p) in template_nodes.iter().enumerate() {
@@ -73,7 +74,7 @@ impl LidField {
                     .iter()
                     .map(|s| {
                         let moved = p + s.deltas[i].cast::<f64>() - socket.center;
-                        (alpha * (moved.norm() - rest)) as f32
+                        (alphas[i] * (moved.norm() - rest)) as f32
                     })
                     .collect();
                 let rest_radius = (nodes[i] - eyes[e].center).norm() as f32;
@@ -161,7 +162,7 @@ mod tests {
             &[open],
             &eyes,
             std::slice::from_ref(&shape),
-            1.0,
+            &[1.0],
         )
         .unwrap();
         let node = &field.nodes[0];
@@ -182,6 +183,6 @@ mod tests {
     fn nodes_far_from_the_eyes_do_not_slide() {
         let eyes = eyes();
         let p = Point::new(30.0, 30.0, 10.0);
-        assert_eq!(LidField::new(&[p], &eyes, &[p], &eyes, &[], 1.0), None);
+        assert_eq!(LidField::new(&[p], &eyes, &[p], &eyes, &[], &[1.0]), None);
     }
 }

@@ -12,6 +12,7 @@
 //! Zhu & Joslin 2024, section 3.3; the hinge and the lids are this project's own.
 
 mod alpha;
+mod alpha_field;
 mod blendshape;
 mod closing;
 mod error;
@@ -21,6 +22,7 @@ mod lids;
 mod roles;
 
 pub use alpha::{ALPHA_LIMITS, size_ratio};
+pub use alpha_field::AlphaField;
 pub use blendshape::{MuscleShape, ShapeSampler, muscle_shapes, smoothed_normals};
 pub use closing::LidClosing;
 pub use error::TransferError;
