@@ -34,7 +34,7 @@ MESH = {
     "Mesh3D:vertex_colors": f"{SURFACE}.mesh_colors[]",
 }
 PLOTTED = 12
-"""Lines in one plot; more cannot be told apart."""
+"""Lines in one plot, taken from all over the list; more cannot be told apart."""
 
 
 def mapping(target, component, selector):
@@ -62,7 +62,7 @@ def scene(name, topics):
         background=[34, 38, 43],
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
-            position=[0, -4.5, 0.1], look_target=[0, 0, 0], eye_up=[0, 0, 1]
+            position=[0, -3.6, 0.1], look_target=[0, 0, 0], eye_up=[0, 0, 1]
         ),
     )
 
@@ -73,7 +73,7 @@ def plot(name, topic, component, fields):
         rr.SeriesLines(names=field).visualizer(
             mappings=[mapping("Scalars:scalars", component, f".{field}")]
         )
-        for field in fields[:PLOTTED]
+        for field in fields[:: -(-len(fields) // PLOTTED)]
     ]
     return rrb.TimeSeriesView(origin=topic, name=name, overrides={topic: lines})
 
@@ -94,7 +94,12 @@ def blueprint(path):
     if weights:
         below.append(plot("Weights", "/weights", "fabrig.Weights:message", weights))
     if stats:
-        below.append(plot("Statistics", "/stats", "fabrig.Stats:message", stats))
+        # Energies are larger than everything else by orders of magnitude.
+        energies = [name for name in stats if name.endswith("_energy")]
+        others = [name for name in stats if name not in energies]
+        for name, fields in [("Statistics", others), ("Energies", energies)]:
+            if fields:
+                below.append(plot(name, "/stats", "fabrig.Stats:message", fields))
     below.append(rrb.TextLogView(origin="/log", name="Log"))
     above = rrb.Horizontal(
         scene("Skin", [SKIN, PARTS]),
