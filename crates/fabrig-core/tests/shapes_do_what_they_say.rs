@@ -1,5 +1,6 @@
-//! Each of the 52 shapes at weight 1 does on the demo face what its name says, in millimetres
-//! on named points of its own skin; left shapes leave the right half still, and left and right
+//! Each of the 52 shapes at weight 1 does on the demo face (and on ict_neutral, where the folder
+//! of shared data is given by `FABRIG_SHARED`) what its name says, in millimetres on named
+//! points of its own skin; left shapes leave the right half still, and left and right
 //! mirror each other.
 #![allow(
     clippy::unwrap_used,
@@ -13,31 +14,36 @@ use std::sync::Arc;
 use fabrig_core::Vector;
 use fabrig_core::scene::{Scene, Simulation};
 use fabrig_core::template::{self, RigidBody};
+use faces::RiggedFace;
 
-/// The demo face in one pose.
+/// A face in one pose.
 struct Posed {
+    face: &'static RiggedFace,
     rest: Vec<nalgebra::Point3<f32>>,
     now: Vec<nalgebra::Point3<f32>>,
     gazes: [Vector; 2],
 }
 
 struct Stage {
+    face: &'static RiggedFace,
     simulation: Simulation,
 }
 
 impl Stage {
-    fn new() -> Self {
-        let rig = Arc::clone(&faces::demo().rig);
+    fn new(face: &'static RiggedFace) -> Self {
+        let rig = Arc::clone(&face.rig);
         Self {
+            face,
             simulation: Simulation::new(rig, Scene::without_dynamics(), None).unwrap(),
         }
     }
 
     fn pose(&mut self, shapes: &[&str]) -> Posed {
-        let rig = &faces::demo().rig;
+        let rig = &self.face.rig;
         let on: Vec<(&str, f32)> = shapes.iter().map(|s| (*s, 1.0)).collect();
         self.simulation.reset(faces::pose(rig, &on)).unwrap();
         Posed {
+            face: self.face,
             rest: rig.skin_at_rest(),
             now: self.simulation.skin().to_vec(),
             gazes: [RigidBody::EyeLeft, RigidBody::EyeRight]
@@ -46,23 +52,22 @@ impl Stage {
     }
 }
 
-/// The vertex of the demo face nearest to a landmark, on the landmark's side of lips and lids.
-fn vertex(landmark: &str) -> usize {
+/// The vertex of a face nearest to a landmark, on the landmark's side of lips and lids.
+fn vertex(face: &RiggedFace, landmark: &str) -> usize {
     let template = template::human();
-    let demo = faces::demo();
     let mark = template.landmarks[landmark] as usize;
     let region = template.regions.vertex_regions[mark];
-    let place = demo.registration.positions[mark];
+    let place = face.registration.positions[mark];
     let distance = |v: usize| {
-        let p = demo.registration.to_head * demo.mesh.positions()[v];
+        let p = face.registration.to_head * face.mesh.positions()[v];
         (p - place).norm()
     };
-    (0..demo.mesh.vertex_count())
+    (0..face.mesh.vertex_count())
         .filter(|&v| {
             !template
                 .regions
-                .are_apart(region, demo.registration.face_regions[v])
-                && !demo
+                .are_apart(region, face.registration.face_regions[v])
+                && !face
                     .rig
                     .parts
                     .iter()
@@ -75,13 +80,13 @@ fn vertex(landmark: &str) -> usize {
 impl Posed {
     /// Motion of a landmark. (mm)
     fn motion(&self, landmark: &str) -> Vector {
-        let v = vertex(landmark);
+        let v = vertex(self.face, landmark);
         (self.now[v] - self.rest[v]).cast()
     }
 
     /// Distance of two landmarks now, and at rest. (mm)
     fn distances(&self, a: &str, b: &str) -> (f64, f64) {
-        let (a, b) = (vertex(a), vertex(b));
+        let (a, b) = (vertex(self.face, a), vertex(self.face, b));
         let of = |p: &[nalgebra::Point3<f32>]| f64::from((p[a] - p[b]).norm());
         (of(&self.now), of(&self.rest))
     }
@@ -98,15 +103,15 @@ impl Posed {
     /// overlap. (mm)
     fn aperture(&self, side: &str) -> (f64, f64) {
         let template = template::human();
-        let demo = faces::demo();
-        let middle = self.rest[vertex(&format!("upper_lid_mid_{side}"))].x;
+        let face = self.face;
+        let middle = self.rest[vertex(face, &format!("upper_lid_mid_{side}"))].x;
         let edge = |lid: &str, p: &[nalgebra::Point3<f32>], sign: f32| {
             let region = template.regions.find(&format!("{lid}_{side}")).unwrap();
             let heights = (0..p.len())
-                .filter(|&v| demo.registration.face_regions[v] == region)
+                .filter(|&v| face.registration.face_regions[v] == region)
                 .filter(|&v| (self.rest[v].x - middle).abs() < 4.0)
                 .filter(|&v| {
-                    !demo
+                    !face
                         .rig
                         .parts
                         .iter()
@@ -132,26 +137,40 @@ fn drawn_motion(shape: &str, landmark: &str) -> f64 {
 }
 
 /// Collects what does not hold.
-#[derive(Default)]
-struct Claims(Vec<String>);
+struct Claims {
+    face: &'static str,
+    broken: Vec<String>,
+}
 
 impl Claims {
+    fn about(face: &RiggedFace) -> Self {
+        Self {
+            face: face.name,
+            broken: Vec::new(),
+        }
+    }
+
     fn more(&mut self, claim: impl Into<String>, value: f64, than: f64) {
         if value.is_nan() || value <= than {
-            self.0
+            self.broken
                 .push(format!("{}: {value:.2}, not over {than}", claim.into()));
         }
     }
 
     fn less(&mut self, claim: impl Into<String>, value: f64, than: f64) {
         if value.is_nan() || value >= than {
-            self.0
+            self.broken
                 .push(format!("{}: {value:.2}, not under {than}", claim.into()));
         }
     }
 
     fn settle(self) {
-        assert!(self.0.is_empty(), "\n{}", self.0.join("\n"));
+        assert!(
+            self.broken.is_empty(),
+            "on {}:\n{}",
+            self.face,
+            self.broken.join("\n")
+        );
     }
 }
 
@@ -160,8 +179,12 @@ const SIDES: [(&str, &str, f64); 2] = [("Left", "l", 1.0), ("Right", "r", -1.0)]
 
 #[test]
 fn eyes_and_brows() {
-    let mut stage = Stage::new();
-    let mut claims = Claims::default();
+    faces::subjects().for_each(eyes_and_brows_of);
+}
+
+fn eyes_and_brows_of(face: &'static RiggedFace) {
+    let mut stage = Stage::new(face);
+    let mut claims = Claims::about(face);
     for (eye, (side, s, out)) in SIDES.into_iter().enumerate() {
         let mut shape = |name: &str| {
             (
@@ -243,8 +266,12 @@ fn eyes_and_brows() {
 
 #[test]
 fn jaw_and_mouth() {
-    let mut stage = Stage::new();
-    let mut claims = Claims::default();
+    faces::subjects().for_each(jaw_and_mouth_of);
+}
+
+fn jaw_and_mouth_of(face: &'static RiggedFace) {
+    let mut stage = Stage::new(face);
+    let mut claims = Claims::about(face);
     let lips = ("upper_lip_bottom", "lower_lip_top");
     let width = |p: &Posed| p.distances("lip_corner_l", "lip_corner_r");
 
@@ -375,9 +402,13 @@ fn jaw_and_mouth() {
 
 #[test]
 fn sides_keep_to_themselves_and_mirror_each_other() {
-    let mut stage = Stage::new();
-    let mut claims = Claims::default();
-    let rig = &faces::demo().rig;
+    faces::subjects().for_each(sides_keep_to_themselves_and_mirror_each_other_of);
+}
+
+fn sides_keep_to_themselves_and_mirror_each_other_of(face: &'static RiggedFace) {
+    let mut stage = Stage::new(face);
+    let mut claims = Claims::about(face);
+    let rig = &face.rig;
     let marks = [
         "brow_inner_",
         "brow_outer_",

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
 use fabrig_core::mesh::Mesh;
+use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::registration::{Registration, RegistrationOptions, register};
 use fabrig_core::rig::{FaceOnTemplate, Rig, RigOptions, build, places_of_self};
 use fabrig_core::scene::FacePose;
@@ -25,35 +26,55 @@ pub(crate) fn template_rig() -> Rig {
     build(&face, template, &RigOptions::default()).expect("the template can be rigged")
 }
 
-/// The demo face with its registration.
-pub(crate) struct DemoFace {
+/// A user's face with its registration.
+pub(crate) struct RiggedFace {
+    pub(crate) name: &'static str,
     pub(crate) mesh: Mesh,
     pub(crate) registration: Registration,
     pub(crate) rig: Arc<Rig>,
 }
 
-static DEMO: LazyLock<DemoFace> = LazyLock::new(|| {
-    let template = template::human();
-    let mesh = template::demo_face();
-    let registration = register(
-        &mesh,
-        template,
-        &RegistrationOptions::default(),
-        &mut |_| ControlFlow::Continue(()),
-    )
-    .expect("the demo face registers");
-    let face = FaceOnTemplate::from_registration(&mesh, &registration).expect("a report");
-    let rig = build(&face, template, &RigOptions::default()).expect("the demo face can be rigged");
-    DemoFace {
-        rig: Arc::new(rig),
-        registration,
-        mesh,
+impl RiggedFace {
+    fn new(name: &'static str, mesh: Mesh) -> Self {
+        let template = template::human();
+        let registration = register(
+            &mesh,
+            template,
+            &RegistrationOptions::default(),
+            &mut |_| ControlFlow::Continue(()),
+        )
+        .expect("the face registers");
+        let face = FaceOnTemplate::from_registration(&mesh, &registration).expect("a report");
+        let rig = build(&face, template, &RigOptions::default()).expect("the face can be rigged");
+        Self {
+            name,
+            rig: Arc::new(rig),
+            registration,
+            mesh,
+        }
     }
+}
+
+static DEMO: LazyLock<RiggedFace> =
+    LazyLock::new(|| RiggedFace::new("demo", template::demo_face()));
+
+/// A face that shares nothing with the template's sources, from the folder of shared data that
+/// `FABRIG_SHARED` names.
+static ICT: LazyLock<Option<RiggedFace>> = LazyLock::new(|| {
+    let shared = std::env::var_os("FABRIG_SHARED")?;
+    let path = std::path::Path::new(&shared).join("faces/ict_neutral.obj");
+    let mesh = read_mesh(&path).expect("FABRIG_SHARED has faces/ict_neutral.obj");
+    Some(RiggedFace::new("ict_neutral", mesh))
 });
 
 /// The demo face, registered and rigged once per test binary.
-pub(crate) fn demo() -> &'static DemoFace {
+pub(crate) fn demo() -> &'static RiggedFace {
     &DEMO
+}
+
+/// The demo face, and ict_neutral where `FABRIG_SHARED` is set.
+pub(crate) fn subjects() -> impl Iterator<Item = &'static RiggedFace> {
+    std::iter::once(demo()).chain(ICT.as_ref())
 }
 
 /// A pose with some shapes on, by name.
