@@ -19,9 +19,9 @@ const LEAST_NORMAL_COSINE: f64 = -0.3;
 /// Regions of inner skin, whose flesh is covered by outer skin: names start with these.
 const CAVITIES: [&str; 3] = ["mouth_interior", "socket", "nostril"];
 /// Inner skin looks for nodes this much further, since distance is to the outer skin.
-const CAVITY_REACH: f64 = 1.5;
-/// Inner skin is moved by more of the flesh around it: it takes this many times as many patches
-/// and nodes.
+const CAVITY_REACH: f64 = 2.0;
+/// Inner skin is moved by more of the flesh around it: it takes this many times as many patches,
+/// and as many times the nodes of each.
 const CAVITY_CHOICE: usize = 2;
 
 struct Anchor {
@@ -171,7 +171,7 @@ impl<'a> CandidateFinder<'a> {
         nearest.truncate(choice * self.patch_limit);
         let mut found = Vec::new();
         for (_, patch, anchor) in nearest {
-            for a in self.grid_around(patch, anchor - self.starts[patch]) {
+            for a in self.grid_around(patch, anchor - self.starts[patch], choice > 1) {
                 let anchor = &self.anchors[a];
                 let distance = (anchor.point - point).norm();
                 if distance < reach && is_allowed(anchor) {
@@ -183,7 +183,9 @@ impl<'a> CandidateFinder<'a> {
             }
         }
         found.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.node.cmp(&b.node)));
-        found.truncate(choice * self.candidate_limit);
+        // Around a short ring the same node comes from both sides.
+        found.dedup_by_key(|c| c.node);
+        found.truncate(choice * choice * self.candidate_limit);
         found.sort_by_key(|c| c.node);
         found
     }
@@ -193,13 +195,19 @@ impl<'a> CandidateFinder<'a> {
         self.anchors.len()
     }
 
-    fn grid_around(&self, patch: usize, node: usize) -> Vec<usize> {
+    /// Nodes around one: every grid line within the rings, and with `reaches_far` as many rings
+    /// again at twice the step.
+    fn grid_around(&self, patch: usize, node: usize, reaches_far: bool) -> Vec<usize> {
         let grid = self.charts[patch].grid;
         let (u_count, v_count) = (i64::from(grid.u_count), i64::from(grid.v_count));
         let (u, v) = (node as i64 % u_count, node as i64 / u_count);
+        let mut offsets: Vec<i64> = (-self.rings..=self.rings).collect();
+        if reaches_far {
+            offsets.extend((self.rings / 2 + 1..=self.rings).flat_map(|k| [-2 * k, 2 * k]));
+        }
         let mut around = Vec::new();
-        for dv in -self.rings..=self.rings {
-            for du in -self.rings..=self.rings {
+        for dv in &offsets {
+            for du in &offsets {
                 let (mut u, v) = (u + du, v + dv);
                 if grid.is_periodic {
                     u = u.rem_euclid(u_count);
