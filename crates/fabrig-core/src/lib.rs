@@ -42,3 +42,8 @@ pub use error::Error;
 pub type Point = nalgebra::Point3<f64>;
 /// A displacement or direction, double precision. (mm) unless stated.
 pub type Vector = nalgebra::Vector3<f64>;
+
+/// Compiles the README's Rust example.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
