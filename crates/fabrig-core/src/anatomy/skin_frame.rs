@@ -1,7 +1,7 @@
 //! The skin as a place to lay patches on: smoothed normals, areas, thickness.
 
 use super::error::AnatomyError;
-use crate::mesh::{Surface, SurfacePoint, vertex_normals};
+use crate::mesh::{Surface, SurfacePoint, vertex_areas, vertex_normals};
 use crate::{Point, Vector};
 
 /// Rounds of averaging over neighbours that normals and areas go through: wide enough to pass
@@ -29,14 +29,7 @@ impl SkinFrame {
         let surface = Surface::new(positions, triangles)?;
         let edges = triangle_edges(triangles);
         let mut normals = vertex_normals(positions, triangles);
-        let mut areas = vec![0.0; positions.len()];
-        for t in triangles {
-            let [a, b, c] = t.map(|v| positions[v as usize]);
-            let third = (b - a).cross(&(c - a)).norm() / 6.0;
-            for &v in t {
-                areas[v as usize] += third;
-            }
-        }
+        let mut areas = vertex_areas(positions, triangles);
         for _ in 0..SMOOTHING_ROUNDS {
             smooth(&edges, &mut normals, Vector::zeros());
             for n in &mut normals {
