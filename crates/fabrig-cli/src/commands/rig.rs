@@ -8,7 +8,7 @@ use fabrig_core::Point;
 use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::{read_mesh, write_obj};
 use fabrig_core::pipeline::{RigFaceOptions, RiggedFace, rig_face};
-use fabrig_core::registration::{DistanceStatistics, OpeningState};
+use fabrig_core::registration::{DistanceStatistics, OpeningMeasure, OpeningState};
 use fabrig_core::template;
 
 use super::{Outcome, check_output};
@@ -88,19 +88,13 @@ pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
     if let Some(landmarks) = &report.landmarks {
         line("landmarks", distances(landmarks));
     }
-    let state = |s: OpeningState| match s {
-        OpeningState::Open => "open",
-        OpeningState::Fused => "fused",
-    };
-    line(
-        "openings",
-        format!(
-            "mouth {}, left eye {}, right eye {}",
-            state(report.mouth),
-            state(report.eyes[0]),
-            state(report.eyes[1])
-        ),
-    );
+    for (name, opening) in [
+        ("mouth", &report.openings.mouth),
+        ("left eye", &report.openings.eyes[0]),
+        ("right eye", &report.openings.eyes[1]),
+    ] {
+        line(name, opening_text(opening));
+    }
     line(
         "quality",
         format!(
@@ -124,6 +118,22 @@ pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
     for warning in &report.warnings {
         line("note", warning.clone());
     }
+}
+
+fn opening_text(opening: &OpeningMeasure) -> String {
+    let state = match opening.state {
+        OpeningState::Open => "open",
+        OpeningState::Closed => "closed",
+        OpeningState::Fused => "fused",
+    };
+    let inside = match opening.inside_mm {
+        Some(mm) => format!("{mm:.1} mm of surface behind the seam"),
+        None => "nothing joins the sides".to_owned(),
+    };
+    format!(
+        "{state}, gap {:.1} mm, {inside}; seam off by median {:.2}  95% {:.2} mm",
+        opening.gap_mm, opening.seam.median, opening.seam.p95
+    )
 }
 
 /// Landmarks from a JSON object of name -> [x, y, z].

@@ -13,7 +13,7 @@
 //! # Limits
 //!
 //! Lips and lids that are one closed surface have no contact line to match; the report says so
-//! (`mouth`, `eyes`). One face a mesh; hair that hides the face is taken for skin.
+//! (`openings`). One face a mesh; hair that hides the face is taken for skin.
 
 mod alignment;
 mod clean;
@@ -23,6 +23,7 @@ mod face_model;
 mod mapping;
 mod node_graph;
 mod nonrigid_icp;
+mod opening_state;
 mod openings;
 mod parts;
 mod refinement;
@@ -37,5 +38,8 @@ pub use clean::{CleaningReport, Sphere};
 pub use error::RegistrationError;
 pub use parts::RigidComponent;
 pub use register::{Progress, Registration, RegistrationOptions, register};
-pub use report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime};
+pub use report::{
+    DistanceStatistics, OpeningMeasure, OpeningMeasures, OpeningState, RegistrationReport,
+    StageTime,
+};
 pub use similarity::MIN_LANDMARK_COUNT;

@@ -9,14 +9,9 @@
 //! The template is probed in the same way once, so that what is matched is the same thing on
 //! both: the places where one sees lips and lids part.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use super::face_model::{FaceModel, Opening, OpeningKind};
 use super::nonrigid_icp::Pin;
-use super::report::OpeningState;
-use super::target::Target;
-use crate::mesh::{Surface, Topology};
+use crate::mesh::Surface;
 use crate::{Point, Vector};
 
 /// Columns from corner to corner.
@@ -41,30 +36,32 @@ pub(super) struct Parting {
     pub(super) kind: OpeningKind,
     pub(super) columns: Vec<PartingColumn>,
     /// Whether one looks inside in most of the columns.
-    is_through: bool,
+    pub(super) is_through: bool,
     /// From corner to corner. (mm)
-    width: f64,
-    up: Vector,
+    pub(super) width: f64,
+    pub(super) up: Vector,
+    /// From the right corner to the left one.
+    pub(super) across: Vector,
 }
 
 /// Where lips or lids part at one place between the corners.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PartingColumn {
     /// From the right corner (-X), 0, to the left one, 1.
-    fraction: f64,
-    upper: Hit,
-    lower: Hit,
+    pub(super) fraction: f64,
+    pub(super) upper: Hit,
+    pub(super) lower: Hit,
     /// From 0 to 1.
     trust: f64,
 }
 
 /// Where a ray meets a surface.
 #[derive(Debug, Clone, Copy)]
-struct Hit {
+pub(super) struct Hit {
     /// Along the view, towards the viewer. (mm)
     depth: f64,
-    point: Point,
-    triangle: u32,
+    pub(super) point: Point,
+    pub(super) triangle: u32,
     barycentric: [f64; 3],
 }
 
@@ -145,6 +142,7 @@ fn trace(opening: &Opening, surface: &Surface, vertices: &[Point]) -> Option<Par
         is_through: 2 * through_count > columns.len(),
         width: (left - right).norm(),
         up,
+        across,
     })
 }
 
@@ -268,75 +266,6 @@ fn edges(column: &Column, row: usize) -> Option<(Hit, Hit)> {
         _ => true,
     };
     Some(if is_step { (next, here) } else { (here, here) })
-}
-
-/// Open where one looks inside, or where the way from side to side along the surface is nearly
-/// as long as the way round a corner; closed and fused otherwise.
-pub(super) fn state_of(target: &Target, parting: &Parting) -> OpeningState {
-    const BESIDE_MM: f64 = 2.0;
-    if parting.is_through {
-        return OpeningState::Open;
-    }
-    let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
-    let beside = parting.up * BESIDE_MM;
-    let middle: Vec<_> = parting
-        .columns
-        .iter()
-        .filter(|c| (c.fraction - 0.5).abs() < 0.13)
-        .collect();
-    let open_count = middle
-        .iter()
-        .filter(|column| {
-            let above = nearest_vertex(target, &(column.upper.point + beside));
-            let below = nearest_vertex(target, &(column.lower.point - beside));
-            let direct =
-                (target.positions[above as usize] - target.positions[below as usize]).norm();
-            !is_within(
-                target,
-                &topology,
-                above,
-                below,
-                direct + 0.55 * parting.width,
-            )
-        })
-        .count();
-    if 2 * open_count > middle.len() {
-        OpeningState::Open
-    } else {
-        OpeningState::Fused
-    }
-}
-
-fn nearest_vertex(target: &Target, point: &Point) -> u32 {
-    let at = target.surface.closest(point);
-    let corners = target.triangles[at.triangle as usize];
-    let k = (0..3)
-        .max_by(|&a, &b| at.barycentric[a].total_cmp(&at.barycentric[b]))
-        .unwrap_or(0);
-    corners[k]
-}
-
-/// Whether `to` can be reached from `from` along edges within `limit`.
-fn is_within(target: &Target, topology: &Topology, from: u32, to: u32, limit: f64) -> bool {
-    let mut distance = std::collections::BTreeMap::from([(from, 0.0f64)]);
-    let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
-    while let Some(Reverse((bits, v))) = queue.pop() {
-        if v == to {
-            return true;
-        }
-        let d = f64::from_bits(bits);
-        if distance.get(&v).is_some_and(|&known| d > known) {
-            continue;
-        }
-        for &n in topology.neighbours(v) {
-            let step = d + (target.positions[n as usize] - target.positions[v as usize]).norm();
-            if step <= limit && distance.get(&n).is_none_or(|&known| step < known) {
-                distance.insert(n, step);
-                queue.push(Reverse((step.to_bits(), n)));
-            }
-        }
-    }
-    false
 }
 
 /// Pins of the template's partings to those of the face, at equal fractions from corner to

@@ -13,10 +13,13 @@ use super::face_model::{FaceModel, OpeningKind, Role};
 use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
-use super::openings::{Parting, find_partings, parting_pins, state_of};
+use super::opening_state::{measure_opening, opening_warnings, seam_distances};
+use super::openings::{Parting, find_partings, parting_pins};
 use super::parts::{RigidComponent, found_eyes, recognise};
 use super::refinement::refine;
-use super::report::{DistanceStatistics, OpeningState, RegistrationReport, StageTime, measure};
+use super::report::{
+    DistanceStatistics, OpeningMeasures, OpeningState, RegistrationReport, StageTime, measure,
+};
 use super::settling::{settle_hidden, unfold};
 use super::similarity::{
     MatchedLandmarks, from_landmarks, match_landmarks, umeyama, useful_landmarks,
@@ -24,7 +27,7 @@ use super::similarity::{
 use super::target::Target;
 use super::{CleaningReport, RegistrationError};
 use crate::Point;
-use crate::mesh::{Mesh, Surface, SurfacePoint, vertex_normals};
+use crate::mesh::{Mesh, Surface, SurfacePoint, Topology, vertex_normals};
 use crate::template::{RegionId, Template};
 
 /// Fewer triangles than this are no face.
@@ -157,15 +160,12 @@ pub fn register(
     clock.finish("refine");
 
     clock.step("map", 0.9)?;
-    let state = |kind: OpeningKind| {
-        partings
-            .iter()
-            .find(|p| p.kind == kind)
-            .map_or(OpeningState::Fused, |p| state_of(&target, p))
-    };
-    let mouth = state(OpeningKind::Mouth);
-    let eyes = [state(OpeningKind::LeftEye), state(OpeningKind::RightEye)];
-    let has_open_eyes = eyes == [OpeningState::Open; 2];
+    let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
+    let measured = OpeningKind::ALL.map(|kind| {
+        let parting = partings.iter().find(|p| p.kind == kind);
+        measure_opening(&target, &topology, parting)
+    });
+    let has_open_eyes = measured[1..].iter().all(|m| m.state == OpeningState::Open);
     let eye_places = found_eyes(&model, &cleaned, &start.to_head, &refined, has_open_eyes);
     let to_true_size = true_size(
         &model,
@@ -201,8 +201,24 @@ pub fn register(
     let rigid_components = recognise(&model, &cleaned, start.piece, &clean_positions, &positions);
     clock.finish("map");
 
-    let measured = target_of(&cleaned, start.piece, &to_head)?;
-    let measures = measure(&model, &measured, &positions)?;
+    let target = target_of(&cleaned, start.piece, &to_head)?;
+    let measures = measure(&model, &target, &positions)?;
+    let mut openings = measured.map(|m| m.scaled(to_true_size.scaling()));
+    let own = find_partings(
+        &model.openings,
+        &Surface::new(&positions, &model.triangles)?,
+        &positions,
+    );
+    let found = find_partings(&model.openings, &target.surface, &positions);
+    for (opening, kind) in openings.iter_mut().zip(OpeningKind::ALL) {
+        let of = |partings: &[Parting]| partings.iter().find(|p| p.kind == kind).cloned();
+        opening.seam = seam_distances(of(&own).as_ref(), of(&found).as_ref());
+    }
+    let [mouth, left_eye, right_eye] = openings;
+    let openings = OpeningMeasures {
+        mouth,
+        eyes: [left_eye, right_eye],
+    };
     let landmark_distances = (!landmarks.names.is_empty()).then(|| {
         DistanceStatistics::from_distances(
             landmarks
@@ -220,9 +236,7 @@ pub fn register(
             measures.folded_triangles
         ));
     }
-    if mouth == OpeningState::Fused {
-        warnings.push("the lips are one closed surface: they stretch when they part".to_owned());
-    }
+    warnings.extend(opening_warnings(&openings));
     clock.finish("report");
     let report = RegistrationReport {
         cleaning: cleaned.report.clone(),
@@ -236,8 +250,7 @@ pub fn register(
         coverage: measures.coverage,
         folded_triangles: measures.folded_triangles,
         triangle_quality: measures.triangle_quality,
-        mouth,
-        eyes,
+        openings,
         times: std::mem::take(&mut clock.times),
         warnings,
     };

@@ -54,10 +54,45 @@ pub struct StageTime {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OpeningState {
-    /// The mesh is open there: both sides are told apart.
+    /// One sees a gap between both sides.
     Open,
-    /// One closed surface: both sides move as one and stretch when they part.
+    /// Both sides touch, but they are two: behind them is a mouth bag, a socket or the end of
+    /// the mesh. They part without stretching.
+    Closed,
+    /// One surface across the seam: both sides stretch when they part, unless it is cut.
     Fused,
+}
+
+/// What was measured at one opening. Lengths are at true head size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OpeningMeasure {
+    /// What that makes it.
+    pub state: OpeningState,
+    /// Height of the gap one sees in its middle. (mm)
+    pub gap_mm: f64,
+    /// Surface behind the seam: the way along it from side to side less the straight line;
+    /// `None` where nothing joins them. (mm)
+    pub inside_mm: Option<f64>,
+    /// Distance of the template's parting from that of the face, both sides.
+    pub seam: DistanceStatistics,
+}
+
+impl OpeningMeasure {
+    /// In millimetres of another size.
+    pub(super) fn scaled(mut self, scale: f64) -> Self {
+        self.gap_mm *= scale;
+        self.inside_mm = self.inside_mm.map(|mm| mm * scale);
+        self
+    }
+}
+
+/// The openings of a face.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OpeningMeasures {
+    /// The lips.
+    pub mouth: OpeningMeasure,
+    /// Left eye, right eye.
+    pub eyes: [OpeningMeasure; 2],
 }
 
 /// What registration measured.
@@ -85,10 +120,8 @@ pub struct RegistrationReport {
     pub folded_triangles: usize,
     /// Smallest, 5 % and median quality of the face's triangles, 1 = equilateral, 0 = no area.
     pub triangle_quality: [f64; 3],
-    /// The mouth, where the template has one.
-    pub mouth: OpeningState,
-    /// Left eye, right eye.
-    pub eyes: [OpeningState; 2],
+    /// Lips and lids: whether they can part, and how well their seams were met.
+    pub openings: OpeningMeasures,
     /// Time of each stage.
     pub times: Vec<StageTime>,
     /// What a person should know, one sentence each.
@@ -98,12 +131,12 @@ pub struct RegistrationReport {
 impl RegistrationReport {
     /// Whether upper and lower lip are one surface in the user's mesh.
     pub fn fused_mouth(&self) -> bool {
-        self.mouth == OpeningState::Fused
+        self.openings.mouth.state == OpeningState::Fused
     }
 
     /// Whether upper and lower lid of an eye are one surface: left, right.
     pub fn fused_eyes(&self) -> [bool; 2] {
-        self.eyes.map(|e| e == OpeningState::Fused)
+        self.openings.eyes.map(|e| e.state == OpeningState::Fused)
     }
 
     /// Time of all stages. (s)
