@@ -236,6 +236,32 @@ pub(crate) enum BenchCommand {
         #[arg(long)]
         json: bool,
     },
+    /// How well faces of known truth are registered, or with `--cost` how long faces of growing
+    /// size take to rig
+    Registration(BenchRegistrationArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchRegistrationArgs {
+    /// Only cases whose name has this in it
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) filter: Option<String>,
+    /// Only the first so many of them
+    #[arg(long, value_name = "N")]
+    pub(crate) cases: Option<usize>,
+    /// Time against size instead: from file to rig, stage by stage
+    #[arg(long, conflicts_with_all = ["filter", "cases", "write"])]
+    pub(crate) cost: bool,
+    /// Largest number of vertices with `--cost`
+    #[arg(long, value_name = "N", default_value_t = 1_100_000, requires = "cost")]
+    pub(crate) largest: usize,
+    /// Only write the meshes there, as OBJ, each with the true places of the template's
+    /// vertices beside it
+    #[arg(long, value_name = "FOLDER", conflicts_with = "json")]
+    pub(crate) write: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {

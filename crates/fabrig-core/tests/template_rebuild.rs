@@ -22,10 +22,13 @@ fn the_committed_pack_is_what_the_source_gives() -> Result<(), Box<dyn std::erro
         templates().join("demo/faces.toml"),
     )?)?;
     let face_file = templates().join("demo/face.bin");
+    let people_file = templates().join("demo/people.bin");
     if std::env::var_os("FABRIG_REBUILD").is_some() {
         let report = build_template(data, &human)?;
         println!("{report:#?}");
-        faces.write(data, &Template::load(&human)?, "demo", &face_file)?;
+        let template = Template::load(&human)?;
+        faces.write(data, &template, "demo", &face_file)?;
+        faces.write_people(data, &template, &people_file)?;
         return Ok(());
     }
     let text = std::fs::read_to_string(human.join("template.toml"))?;
@@ -38,8 +41,13 @@ fn the_committed_pack_is_what_the_source_gives() -> Result<(), Box<dyn std::erro
     let again = scratch.path().join("face.bin");
     faces.write(data, &Template::load(&human)?, "demo", &again)?;
     assert!(
-        std::fs::read(again)? == std::fs::read(face_file)?,
+        std::fs::read(&again)? == std::fs::read(face_file)?,
         "face.bin is not what the source and faces.toml give: rebuild it"
+    );
+    faces.write_people(data, &Template::load(&human)?, &again)?;
+    assert!(
+        std::fs::read(again)? == std::fs::read(people_file)?,
+        "people.bin is not what the source and faces.toml give: rebuild it"
     );
     for name in faces.names() {
         assert!(

@@ -7,21 +7,27 @@ use fabrig_core::pipeline::RigFaceOptions;
 use fabrig_core::scene::{Scene, ShapeLoss, chain_loss};
 use fabrig_core::template;
 
-use super::{Outcome, rig};
+use super::{Outcome, bench_registration, rig};
 use crate::cli::BenchCommand;
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> {
-    let BenchCommand::Chain { cloth, json } = command;
+    match command {
+        BenchCommand::Chain { cloth, json } => chain(console, *cloth, *json),
+        BenchCommand::Registration(args) => bench_registration::run(console, args),
+    }
+}
+
+fn chain(console: &Console, cloth: bool, json: bool) -> Result<Outcome> {
     let template = template::human();
     let rigged = rig::rig(console, &template.skin, &RigFaceOptions::default())?;
-    let scene = if *cloth {
+    let scene = if cloth {
         Scene::default()
     } else {
         Scene::without_dynamics()
     };
     let losses = chain_loss(&Arc::new(rigged.rig), template, &scene)?;
-    if *json {
+    if json {
         console.result(&serde_json::to_string_pretty(&losses)?);
     } else {
         print_table(console, &losses);

@@ -2,6 +2,7 @@
 
 mod animate;
 mod bench;
+mod bench_registration;
 mod demo;
 mod info;
 mod pose;

@@ -20,9 +20,11 @@
 //! ```
 
 mod animate;
+mod cost;
 mod rig_face;
 mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
+pub use cost::{CostRow, cost};
 pub use rig_face::{RigFaceOptions, RiggedFace, rig_face};
 pub use timing::TimeStatistics;

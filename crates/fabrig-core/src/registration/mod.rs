@@ -16,6 +16,7 @@
 //! (`openings`). One face a mesh; hair that hides the face is taken for skin.
 
 mod alignment;
+pub mod bench;
 mod clean;
 mod closest_grid;
 mod error;

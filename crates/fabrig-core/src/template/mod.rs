@@ -9,6 +9,7 @@ mod error;
 mod geometry;
 mod load;
 mod pack;
+mod people;
 
 pub use demo::{demo_face, demo_take};
 pub use error::TemplateError;
@@ -17,3 +18,4 @@ pub use pack::{
     EyeSocket, JawHinge, Landmarks, Region, RegionId, Regions, RigidBody, RigidPart, Template,
     WholeFaceShape,
 };
+pub use people::{Person, people};

@@ -58,7 +58,7 @@ struct Decimation {
 }
 
 /// Collapses edges until at most `vertex_count` vertices are left, or none can go.
-pub(super) fn decimate(
+pub(crate) fn decimate(
     positions: &[Point],
     triangles: &[[u32; 3]],
     vertex_count: usize,

@@ -19,7 +19,9 @@ use super::subdivide::catmull_clark;
 use crate::atomic_file::write_atomically;
 use crate::mesh::{Mesh, Polygons};
 use crate::template::demo::{StoredFace, assemble};
+
 use crate::template::geometry::{pack, to_steps};
+use crate::template::people::store_people;
 use crate::template::{Template, TemplateError};
 use crate::{Point, Vector};
 
@@ -104,6 +106,61 @@ impl FaceList {
                 source,
             }
         })
+    }
+
+    /// Writes everyone on the list in the template's topology, the way
+    /// [`crate::template::people`] are kept.
+    ///
+    /// # Errors
+    ///
+    /// [`TemplateError`]; the file is only replaced by a whole one.
+    pub fn write_people(
+        &self,
+        data: &Path,
+        template: &Template,
+        path: &Path,
+    ) -> Result<(), TemplateError> {
+        let people = self
+            .faces
+            .iter()
+            .map(|(name, recipe)| Ok((name.clone(), self.person(data, template, recipe)?)))
+            .collect::<Result<Vec<_>, TemplateError>>()?;
+        let bytes = pack(&store_people(template, &people))?;
+        write_atomically(path, |file| file.write_all(&bytes)).map_err(|source| {
+            TemplateError::Write {
+                path: path.to_owned(),
+                source,
+            }
+        })
+    }
+
+    /// The template's skin vertices on another person, eyes about where the template's are. [mm]
+    fn person(
+        &self,
+        data: &Path,
+        template: &Template,
+        recipe: &FaceRecipe,
+    ) -> Result<Vec<Point>, TemplateError> {
+        let base = BaseMesh::read(data)?;
+        let positions = identity(data, &base, &recipe.identity)?;
+        let take = |source: &[u32]| -> Vec<Point> {
+            source
+                .iter()
+                .map(|&s| positions[s as usize] * self.millimetres_per_unit)
+                .collect()
+        };
+        let mut shift = Vector::zeros();
+        for ((name, group, _), eye) in PARTS.iter().zip(&template.eyes) {
+            let (center, _) = fit_sphere(&take(&part(&base, name, group)?.source))?;
+            shift += (eye.center - center) / 2.0;
+        }
+        let head = crop_head(&base, self.neck_vertex)?;
+        if head.source.len() != template.skin.vertex_count() {
+            return Err(TemplateError::Source {
+                reason: "the head is not cut where the template's is".to_owned(),
+            });
+        }
+        Ok(take(&head.source).iter().map(|p| p + shift).collect())
     }
 
     fn stored(

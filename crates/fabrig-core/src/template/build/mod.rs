@@ -12,8 +12,8 @@
 //!    their distance from the eyeball, blinks close) and at the lips (they do not pass through
 //!    each other).
 //!
-//! [`FaceList`] makes faces of other people from the same source, remeshed, for tests and for
-//! the demo.
+//! [`FaceList`] makes faces of other people from the same source: remeshed for tests and for the
+//! demo, and in the template's topology as the truth that registration is measured against.
 
 mod crop;
 mod decimate;
@@ -28,5 +28,6 @@ mod rigid;
 mod source;
 mod subdivide;
 
+pub(crate) use decimate::decimate;
 pub use face::FaceList;
 pub use pack::{BuildReport, build_geometry, build_template};
