@@ -124,7 +124,11 @@ fn measure(template: &Template, specimen: &Specimen, found: &Registration) -> Re
         face_to_template: report.face_to_template,
         folded_triangles: report.folded_triangles,
         confidence: report.confidence,
-        openings: [report.mouth, report.eyes[0], report.eyes[1]],
+        openings: [
+            report.openings.mouth.state,
+            report.openings.eyes[0].state,
+            report.openings.eyes[1].state,
+        ],
         warnings: report.warnings.clone(),
         times: report.times.clone(),
     })
