@@ -324,7 +324,7 @@ fn poses(list: &mut List) {
         ),
         (
             "on its back, 1e-3",
-            Similarity3::new(Vector::new(2.0, 0.0, 0.5), Vector::x() * -1.5708, 1e-3),
+            Similarity3::new(Vector::new(2.0, 0.0, 0.5), Vector::x() * -1.6, 1e-3),
         ),
         (
             "looking away, 0.1",
