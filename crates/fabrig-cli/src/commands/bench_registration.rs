@@ -117,7 +117,7 @@ fn write(console: &Console, chosen: &[Case], folder: &Path) -> Result<Outcome> {
         let truth = template::human()
             .skin
             .with_positions(specimen.truth.clone())?;
-        write_obj(&folder.join(format!("{name}.truth.obj")), &truth)?;
+        write_obj(folder.join(format!("{name}.truth.obj")), &truth)?;
         console.result(&mesh.display().to_string());
     }
     Ok(Outcome::Done)
