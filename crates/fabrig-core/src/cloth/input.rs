@@ -112,7 +112,7 @@ pub enum Precision {
     Single,
     /// f32, patch by patch.
     SingleScalar,
-    /// f64, patch by patch: the reference.
+    /// f64, patches of one shape side by side: the reference.
     Double,
 }
 

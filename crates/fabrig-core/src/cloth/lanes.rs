@@ -1,7 +1,7 @@
 //! Lane types: one text of every kernel for scalars and for several patches at once.
 //!
 //! A kernel written over [`Real`] runs on `f64` (the reference), on `f32`, and on
-//! [`Lanes`], where lane k belongs to the k-th patch of a group (lane per patch: the patches
+//! lane types such as [`F32x8`], where lane k belongs to the k-th patch of a group (lane per patch: the patches
 //! of a group share their grid, so no lane ever needs another lane's neighbour, and nothing
 //! is gathered).
 //!
@@ -33,6 +33,9 @@ pub(crate) trait Real:
     /// The same value in every lane.
     fn splat(value: f64) -> Self;
 
+    /// The value that a function gives for each lane.
+    fn from_lanes(value: impl Fn(usize) -> f32) -> Self;
+
     /// Value of one lane.
     fn lane(self, lane: usize) -> f64;
 
@@ -47,6 +50,9 @@ pub(crate) trait Real:
 
     /// `if a < b { yes } else { no }`, lane by lane.
     fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self;
+
+    /// Whether `a < b` in any lane.
+    fn any_less(a: Self, b: Self) -> bool;
 }
 
 macro_rules! scalar_real {
@@ -57,6 +63,11 @@ macro_rules! scalar_real {
             #[inline(always)]
             fn splat(value: f64) -> Self {
                 value as $scalar
+            }
+
+            #[inline(always)]
+            fn from_lanes(value: impl Fn(usize) -> f32) -> Self {
+                <$scalar>::from(value(0))
             }
 
             #[inline(always)]
@@ -83,6 +94,11 @@ macro_rules! scalar_real {
             fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self {
                 if a < b { yes } else { no }
             }
+
+            #[inline(always)]
+            fn any_less(a: Self, b: Self) -> bool {
+                a < b
+            }
         }
     };
 }
@@ -90,21 +106,119 @@ macro_rules! scalar_real {
 scalar_real!(f32);
 scalar_real!(f64);
 
-/// `N` single-precision lanes. Arithmetic is written as plain loops over the lanes, which the
-/// compiler turns into register operations of the instruction set that the caller enabled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(C, align(32))]
-pub(crate) struct Lanes<const N: usize>(pub(crate) [f32; N]);
+/// Declares a type of several lanes. Arithmetic is written as plain loops over the lanes, which
+/// the compiler turns into register operations of the instruction set that the caller enabled.
+macro_rules! lanes {
+    ($(#[$doc:meta])* $name:ident, $scalar:ty, $count:literal, $bytes:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[repr(C, align($bytes))]
+        pub(crate) struct $name(pub(crate) [$scalar; $count]);
 
-macro_rules! lane_operator {
-    ($trait:ident, $method:ident, $operator:tt) => {
-        impl<const N: usize> $trait for Lanes<N> {
+        lanes!(@operator $name, $count, Add, add, +);
+        lanes!(@operator $name, $count, Sub, sub, -);
+        lanes!(@operator $name, $count, Mul, mul, *);
+        lanes!(@operator $name, $count, Div, div, /);
+
+        impl Neg for $name {
+            type Output = Self;
+
+            #[inline(always)]
+            fn neg(self) -> Self {
+                let mut out = self.0;
+                for lane in 0..$count {
+                    out[lane] = -self.0[lane];
+                }
+                Self(out)
+            }
+        }
+
+        impl AddAssign for $name {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+
+        impl SubAssign for $name {
+            #[inline(always)]
+            fn sub_assign(&mut self, other: Self) {
+                *self = *self - other;
+            }
+        }
+
+        impl Real for $name {
+            const LANES: usize = $count;
+
+            #[inline(always)]
+            fn splat(value: f64) -> Self {
+                Self([value as $scalar; $count])
+            }
+
+            #[inline(always)]
+            fn from_lanes(value: impl Fn(usize) -> f32) -> Self {
+                let mut out = [0.0; $count];
+                for lane in 0..$count {
+                    out[lane] = <$scalar>::from(value(lane));
+                }
+                Self(out)
+            }
+
+            #[inline(always)]
+            fn lane(self, lane: usize) -> f64 {
+                f64::from(self.0[lane])
+            }
+
+            #[inline(always)]
+            fn set_lane(&mut self, lane: usize, value: f64) {
+                self.0[lane] = value as $scalar;
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                let mut out = [0.0; $count];
+                for lane in 0..$count {
+                    out[lane] = self.0[lane].sqrt();
+                }
+                Self(out)
+            }
+
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                Self::select_less(self, other, other, self)
+            }
+
+            #[inline(always)]
+            fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self {
+                let mut out = [0.0; $count];
+                for lane in 0..$count {
+                    out[lane] = if a.0[lane] < b.0[lane] {
+                        yes.0[lane]
+                    } else {
+                        no.0[lane]
+                    };
+                }
+                Self(out)
+            }
+
+            #[inline(always)]
+            fn any_less(a: Self, b: Self) -> bool {
+                let mut any = false;
+                for lane in 0..$count {
+                    any |= a.0[lane] < b.0[lane];
+                }
+                any
+            }
+        }
+    };
+    (@operator $name:ident, $count:literal, $trait:ident, $method:ident, $operator:tt) => {
+        impl $trait for $name {
             type Output = Self;
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let mut out = [0.0; N];
-                for lane in 0..N {
+                let mut out = [0.0; $count];
+                for lane in 0..$count {
                     out[lane] = self.0[lane] $operator other.0[lane];
                 }
                 Self(out)
@@ -113,79 +227,22 @@ macro_rules! lane_operator {
     };
 }
 
-lane_operator!(Add, add, +);
-lane_operator!(Sub, sub, -);
-lane_operator!(Mul, mul, *);
-lane_operator!(Div, div, /);
-
-impl<const N: usize> Neg for Lanes<N> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(self.0.map(|value| -value))
-    }
-}
-
-impl<const N: usize> AddAssign for Lanes<N> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<const N: usize> SubAssign for Lanes<N> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
-
-impl<const N: usize> Real for Lanes<N> {
-    const LANES: usize = N;
-
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self([value as f32; N])
-    }
-
-    #[inline(always)]
-    fn lane(self, lane: usize) -> f64 {
-        f64::from(self.0[lane])
-    }
-
-    #[inline(always)]
-    fn set_lane(&mut self, lane: usize, value: f64) {
-        self.0[lane] = value as f32;
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        let mut out = [0.0; N];
-        for lane in 0..N {
-            out[lane] = self.0[lane].sqrt();
-        }
-        Self(out)
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self::select_less(self, other, other, self)
-    }
-
-    #[inline(always)]
-    fn select_less(a: Self, b: Self, yes: Self, no: Self) -> Self {
-        let mut out = [0.0; N];
-        for lane in 0..N {
-            out[lane] = if a.0[lane] < b.0[lane] {
-                yes.0[lane]
-            } else {
-                no.0[lane]
-            };
-        }
-        Self(out)
-    }
-}
+lanes!(
+    /// Four single-precision lanes.
+    F32x4, f32, 4, 16
+);
+lanes!(
+    /// Eight single-precision lanes.
+    F32x8, f32, 8, 32
+);
+lanes!(
+    /// Four double-precision lanes.
+    F64x4, f64, 4, 32
+);
+lanes!(
+    /// Eight double-precision lanes.
+    F64x8, f64, 8, 64
+);
 
 /// A vector of three [`Real`]s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -298,7 +355,7 @@ mod tests {
     fn every_lane_does_what_a_scalar_does() {
         let a = [1.5_f32, -2.0, 0.3, 7.0];
         let b = [0.1_f32, 3.0, -0.7, 7.0];
-        let (la, lb) = (Lanes(a), Lanes(b));
+        let (la, lb) = (F32x4(a), F32x4(b));
         for lane in 0..4 {
             let scalars = [
                 a[lane] + b[lane],
@@ -318,7 +375,7 @@ mod tests {
                 -la,
                 (la * la).sqrt(),
                 la.max(lb),
-                Real::select_less(la, lb, Lanes::splat(1.0), Lanes::splat(2.0)),
+                Real::select_less(la, lb, F32x4::splat(1.0), F32x4::splat(2.0)),
             ];
             for (scalar, l) in scalars.iter().zip(lanes) {
                 assert_eq!(scalar.to_bits(), l.0[lane].to_bits());

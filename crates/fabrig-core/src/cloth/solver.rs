@@ -11,7 +11,7 @@ use super::group::{Group, GroupPairs, Monitor, Partner, PatchGroup, Substep};
 use super::input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion, Precision,
 };
-use super::lanes::Lanes;
+use super::lanes::{F32x4, F32x8, F64x4, F64x8};
 use super::report::{Counters, Energies, StepReport};
 use super::validate;
 
@@ -217,10 +217,15 @@ impl Cloth {
                 .for_each(|(group, monitor)| {
                     group.begin_frame(dt, targets, anchors);
                     let mut none = Vec::new();
-                    for substep in &substeps {
-                        group.predict(substep, &mut none);
+                    for (k, substep) in substeps.iter().enumerate() {
+                        if k == 0 {
+                            group.predict(substep, &mut none);
+                        } else {
+                            group.turn(substep, &mut none);
+                        }
                         group.solve(substep, &[]);
                     }
+                    group.finish();
                     group.end_frame(monitor);
                 });
         }
@@ -381,8 +386,9 @@ fn advance_together(
             .zip(next.par_iter_mut())
             .for_each(|(g, p)| {
                 g.solve(substep, shared);
-                if let Some(following) = following {
-                    g.predict(following, p);
+                match following {
+                    Some(following) => g.turn(following, p),
+                    None => g.finish(),
                 }
             });
         std::mem::swap(now, next);
@@ -392,8 +398,8 @@ fn advance_together(
 /// Patches of one shape, with or without pressure, in chunks of at most eight.
 fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> {
     let widest = match precision {
-        Precision::Single => 8,
-        Precision::SingleScalar | Precision::Double => 1,
+        Precision::Single | Precision::Double => 8,
+        Precision::SingleScalar => 1,
     };
     let mut alike: BTreeMap<(u32, u32, bool, bool), Vec<usize>> = BTreeMap::new();
     for (index, p) in patches.iter().enumerate() {
@@ -422,10 +428,12 @@ fn make_group(
     options: &ClothOptions,
 ) -> Box<dyn PatchGroup> {
     match (options.precision, members.len()) {
-        (Precision::Double, _) => Box::new(Group::<f64>::new(patches, members, options)),
+        (Precision::Double, 1) => Box::new(Group::<f64>::new(patches, members, options)),
+        (Precision::Double, 2..=4) => Box::new(Group::<F64x4>::new(patches, members, options)),
+        (Precision::Double, _) => Box::new(Group::<F64x8>::new(patches, members, options)),
         (_, 1) => Box::new(Group::<f32>::new(patches, members, options)),
-        (_, 2..=4) => Box::new(Group::<Lanes<4>>::new(patches, members, options)),
-        _ => Box::new(Group::<Lanes<8>>::new(patches, members, options)),
+        (_, 2..=4) => Box::new(Group::<F32x4>::new(patches, members, options)),
+        _ => Box::new(Group::<F32x8>::new(patches, members, options)),
     }
 }
 

@@ -218,10 +218,34 @@ fn motion(
     if !motion.velocities.is_empty() {
         length(names[1], motion.velocities.len())?;
     }
-    let positions = motion.positions.iter().map(|p| p.coords.into());
-    values(names[0], patch, positions, FARTHEST)?;
-    let velocities = motion.velocities.iter().map(|&v| v.into());
-    values(names[1], patch, velocities, FASTEST)
+    let (positions, velocities) = (&motion.positions, &motion.velocities);
+    // All in one go, without branches; only where something is wrong it is looked for.
+    let is_sound = positions
+        .iter()
+        .map(|p| all_within(p.coords.as_ref(), FARTHEST))
+        .chain(velocities.iter().map(|v| all_within(v.as_ref(), FASTEST)))
+        .fold(true, |all, one| all & one);
+    if is_sound {
+        return Ok(());
+    }
+    values(
+        names[0],
+        patch,
+        positions.iter().map(|p| p.coords.into()),
+        FARTHEST,
+    )?;
+    values(
+        names[1],
+        patch,
+        velocities.iter().map(|&v| v.into()),
+        FASTEST,
+    )
+}
+
+/// Whether no number is beyond `limit` in size; false for NaN.
+#[inline(always)]
+fn all_within(v: &[f32; 3], limit: f32) -> bool {
+    (v[0].abs() <= limit) & (v[1].abs() <= limit) & (v[2].abs() <= limit)
 }
 
 fn values(

@@ -65,7 +65,8 @@ pub(crate) fn project_bend<R: Real>(
 ) {
     let two = R::splat(2.0);
     for triple in triples {
-        let [i, j, k] = triple.map(|node| node as usize);
+        let &[i, j, k] = triple;
+        let (i, j, k) = (i as usize, j as usize, k as usize);
         let w = [inv_masses[i], inv_masses[j], inv_masses[k]];
         let (a, b, c) = (displacements[i], displacements[j], displacements[k]);
         let lambda = project_triple(a, b, c, w, bend);
@@ -85,7 +86,8 @@ pub(crate) fn bend_energy<R: Real>(
 ) -> R {
     let mut sum = R::splat(0.0);
     for triple in triples {
-        let [i, j, l] = triple.map(|node| node as usize);
+        let &[i, j, l] = triple;
+        let (i, j, l) = (i as usize, j as usize, l as usize);
         let s = displacements[i] + displacements[l] - displacements[j] - displacements[j];
         let q = s.dot(s) * bend.inv_edge_squared;
         sum += q * (R::splat(1.0) - bend.dropoff / (R::splat(1.0) + q));

@@ -13,15 +13,34 @@
 
 use crate::cloth::lanes::{Real, Vec3};
 
-/// Acceleration of the head frame, splatted over the lanes.
+/// Acceleration in the head frame, splatted over the lanes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FrameForces<R> {
     /// Gravity's difference to the standing gravity, less the linear acceleration. (mm/s^2)
-    pub(crate) uniform: Vec3<R>,
-    /// w. (rad/s)
-    pub(crate) angular_velocity: Vec3<R>,
-    /// w'. (rad/s^2)
-    pub(crate) angular_acceleration: Vec3<R>,
+    uniform: Vec3<R>,
+    /// Rows of the matrix of r -> w' x r + w x (w x r). [1/s^2]
+    turning: [Vec3<R>; 3],
+    /// 2 w. (rad/s)
+    twice: Vec3<R>,
+}
+
+impl<R: Real> FrameForces<R> {
+    /// - `uniform`: gravity's difference to the standing gravity, less the linear acceleration
+    ///   (mm/s^2)
+    /// - `w`: angular velocity (rad/s); `dw`: angular acceleration [rad/s^2]
+    pub(crate) fn new(uniform: [f64; 3], w: [f64; 3], dw: [f64; 3]) -> Self {
+        let [xx, yy, zz] = [w[0] * w[0], w[1] * w[1], w[2] * w[2]];
+        let [xy, xz, yz] = [w[0] * w[1], w[0] * w[2], w[1] * w[2]];
+        Self {
+            uniform: Vec3::splat(uniform),
+            turning: [
+                Vec3::splat([-(yy + zz), xy - dw[2], xz + dw[1]]),
+                Vec3::splat([xy + dw[2], -(xx + zz), yz - dw[0]]),
+                Vec3::splat([xz - dw[1], yz + dw[0], -(xx + yy)]),
+            ],
+            twice: Vec3::splat(w.map(|x| 2.0 * x)),
+        }
+    }
 }
 
 /// Acceleration of one node in the head frame. (mm/s^2)
@@ -33,11 +52,9 @@ pub(crate) fn frame_acceleration<R: Real>(
     r: Vec3<R>,
     v: Vec3<R>,
 ) -> Vec3<R> {
-    let w = forces.angular_velocity;
-    let euler = forces.angular_acceleration.cross(r);
-    let centrifugal = w.cross(w.cross(r));
-    let coriolis = w.cross(v) * R::splat(2.0);
-    forces.uniform - euler - centrifugal - coriolis
+    let [x, y, z] = &forces.turning;
+    let turning = Vec3::new(x.dot(r), y.dot(r), z.dot(r));
+    forces.uniform - turning - forces.twice.cross(v)
 }
 
 #[cfg(test)]
@@ -57,11 +74,11 @@ mod tests {
         for i in 0..steps {
             let t = f64::from(i) * h;
             let angle = 0.5 * t + 0.1 * t * t;
-            let forces = FrameForces {
-                uniform: Vec3::splat([-0.7 * angle.cos(), 0.7 * angle.sin(), 0.0]),
-                angular_velocity: Vec3::splat([0.0, 0.0, 0.5 + 0.2 * t]),
-                angular_acceleration: Vec3::splat([0.0, 0.0, 0.2]),
-            };
+            let forces = FrameForces::new(
+                [-0.7 * angle.cos(), 0.7 * angle.sin(), 0.0],
+                [0.0, 0.0, 0.5 + 0.2 * t],
+                [0.0, 0.0, 0.2],
+            );
             v += frame_acceleration(&forces, r, v) * h;
             r += v * h;
         }
@@ -75,12 +92,24 @@ mod tests {
     }
 
     #[test]
+    fn the_matrix_is_that_of_the_cross_products() {
+        let [w, dw, r, v] = [
+            [0.3, -1.1, 0.7],
+            [2.0, 0.4, -0.9],
+            [50.0, -20.0, 70.0],
+            [3.0, 8.0, -5.0],
+        ];
+        let forces = FrameForces::<f64>::new([1.0, 2.0, 3.0], w, dw);
+        let [w, dw, r, v] = [w, dw, r, v].map(Vec3::splat);
+        let expected =
+            Vec3::splat([1.0, 2.0, 3.0]) - dw.cross(r) - w.cross(w.cross(r)) - w.cross(v) * 2.0;
+        let gap = frame_acceleration(&forces, r, v) - expected;
+        assert!(gap.dot(gap).sqrt() < 1e-12);
+    }
+
+    #[test]
     fn a_still_head_feels_gravity_alone() {
-        let forces = FrameForces {
-            uniform: Vec3::<f32>::splat([0.0, -9810.0, 0.0]),
-            angular_velocity: Vec3::zero(),
-            angular_acceleration: Vec3::zero(),
-        };
+        let forces = FrameForces::<f32>::new([0.0, -9810.0, 0.0], [0.0; 3], [0.0; 3]);
         let a = frame_acceleration(&forces, Vec3::splat([9.0, 8.0, 7.0]), Vec3::splat([1.0; 3]));
         assert_eq!(a.lane(0), [0.0, -9810.0, 0.0]);
     }

@@ -29,13 +29,18 @@ pub(crate) fn swept_volume<R: Real>(
     gradient.fill(Vec3::zero());
     let mut volume = R::splat(0.0);
     for cell in cells {
-        let [a, b, c, d] = cell.map(|node| node as usize);
-        let middle = |i: usize| targets[i] + displacements[i] * half;
-        let first = middle(c) - middle(a);
-        let second = middle(d) - middle(b);
+        let &[a, b, c, d] = cell;
+        let (a, b, c, d) = (a as usize, b as usize, c as usize, d as usize);
+        let (ua, ub, uc, ud) = (
+            displacements[a],
+            displacements[b],
+            displacements[c],
+            displacements[d],
+        );
+        let first = targets[c] - targets[a] + (uc - ua) * half;
+        let second = targets[d] - targets[b] + (ud - ub) * half;
         let area = first.cross(second) * half;
-        let mean =
-            (displacements[a] + displacements[b] + displacements[c] + displacements[d]) * quarter;
+        let mean = (ua + ub + uc + ud) * quarter;
         volume += mean.dot(area);
         let lift = area * quarter;
         let turn_first = second.cross(mean) * quarter;

@@ -56,7 +56,8 @@ pub(crate) fn add_wind<R: Real>(
 ) {
     let (quarter, half) = (R::splat(0.25), R::splat(0.5));
     for cell in cells {
-        let [a, b, c, d] = cell.map(|node| node as usize);
+        let &[a, b, c, d] = cell;
+        let (a, b, c, d) = (a as usize, b as usize, c as usize, d as usize);
         let area = (positions[c] - positions[a]).cross(positions[d] - positions[b]) * half;
         let velocity = (velocities[a] + velocities[b] + velocities[c] + velocities[d]) * quarter;
         let push = cell_force(air, area, wind - velocity) * (quarter * inv_node_mass);

@@ -20,7 +20,7 @@ impl<R: Real> PatchGroup for Group<R> {
 
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
         self.starts.copy_from_slice(&self.ends);
-        self.load_ends(1.0, targets);
+        vectorized(LoadEnds(self, (1.0, targets)));
         self.load_anchors(1.0, anchors);
         vectorized(BeginFrame(self, 1.0));
         self.edge_lengths.hold();
@@ -45,7 +45,7 @@ impl<R: Real> PatchGroup for Group<R> {
             *slope = *v * inv;
         }
         let had_velocity: Vec<bool> = self.lane_states.iter().map(|s| s.has_velocity).collect();
-        self.load_ends(dt, targets);
+        vectorized(LoadEnds(self, (dt, targets)));
         for lane in 0..R::LANES {
             // After a straight segment nothing is known about the velocity here.
             if !had_velocity[lane] {
@@ -73,6 +73,15 @@ impl<R: Real> PatchGroup for Group<R> {
         }
     }
 
+    fn finish(&mut self) {
+        vectorized(Finish(self));
+    }
+
+    fn turn(&mut self, following: &Substep, ports: &mut Vec<Port>) {
+        vectorized(Turn(self, following));
+        self.write_ports(ports);
+    }
+
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>) {
         let sums = vectorized(EnergyOf(self));
         let anchors = self.anchor_energies();
@@ -88,10 +97,7 @@ impl<R: Real> PatchGroup for Group<R> {
                 bend: sums[5].lane(lane),
                 pressure: sums[6].lane(lane),
             };
-            let mut squared = 0.0;
-            for u in &self.displacements {
-                squared += u.dot(*u).lane(lane);
-            }
+            let squared = self.squared_distance.lane(lane);
             let state = &mut self.lane_states[lane];
             let mismatch = self.mismatch.lane(lane) + anchors[lane][1];
             monitors.push(Monitor {
@@ -118,9 +124,9 @@ impl<R: Real> PatchGroup for Group<R> {
     }
 
     fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]) {
-        for (i, p) in positions.iter_mut().enumerate() {
-            let u = self.displacements[i].lane(lane);
-            let end = &self.end_positions[lane][i];
+        let nodes = self.end_positions[lane].iter().zip(&self.displacements);
+        for (p, (end, u)) in positions.iter_mut().zip(nodes) {
+            let u = u.lane(lane);
             *p = Point3::new(
                 (f64::from(end.x) + u[0]) as f32,
                 (f64::from(end.y) + u[1]) as f32,
@@ -162,7 +168,13 @@ macro_rules! vectorized_work {
     };
 }
 
+vectorized_work!(
+    LoadEnds<(f64, &'a [PatchMotion])> -> (),
+    |group, ends| group.load_ends_lanes(ends.0, ends.1)
+);
 vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
 vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
 vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
+vectorized_work!(Finish<> -> (), |group, | group.finish_lanes());
+vectorized_work!(Turn<&'a Substep> -> (), |group, substep| group.turn_lanes(substep));
 vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());

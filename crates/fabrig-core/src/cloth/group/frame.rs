@@ -15,26 +15,40 @@ impl<R: Real> Group<R> {
     }
 
     /// Loads target ends into the lanes. Straight motion is marked by lane.
-    pub(super) fn load_ends(&mut self, dt: f64, targets: &[PatchMotion]) {
-        for lane in 0..R::LANES {
-            let motion = &targets[self.patch_of(lane)];
-            let center = self.origin.lane(lane);
-            for (end, p) in self.ends.iter_mut().zip(&motion.positions) {
-                end.set_lane(lane, relative(p, center));
-            }
-            self.lane_states[lane].has_velocity = !motion.velocities.is_empty();
+    #[inline(always)]
+    pub(super) fn load_ends_lanes(&mut self, dt: f64, targets: &[PatchMotion]) {
+        let motions: Vec<&PatchMotion> = (0..R::LANES)
+            .map(|lane| &targets[self.patch_of(lane)])
+            .collect();
+        for i in 0..self.ends.len() {
+            let at = |axis: usize| R::from_lanes(|lane| motions[lane].positions[i][axis]);
+            self.ends[i] = Vec3::new(at(0), at(1), at(2)) - self.origin;
+        }
+        let has_velocity = |lane: usize| !motions[lane].velocities.is_empty();
+        if (0..R::LANES).all(has_velocity) {
+            let dt = R::splat(dt);
             for (i, slope) in self.end_slopes.iter_mut().enumerate() {
-                match motion.velocities.get(i) {
-                    Some(v) => slope.set_lane(lane, [0, 1, 2].map(|a| f64::from(v[a]) * dt)),
-                    None => {
-                        let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
-                        slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
+                let at = |axis: usize| R::from_lanes(|lane| motions[lane].velocities[i][axis]);
+                *slope = Vec3::new(at(0), at(1), at(2)) * dt;
+            }
+        } else {
+            for (lane, motion) in motions.iter().enumerate() {
+                for (i, slope) in self.end_slopes.iter_mut().enumerate() {
+                    match motion.velocities.get(i) {
+                        Some(v) => slope.set_lane(lane, [0, 1, 2].map(|a| f64::from(v[a]) * dt)),
+                        None => {
+                            let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
+                            slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
+                        }
                     }
                 }
             }
         }
-        for (lane, kept) in self.end_positions.iter_mut().enumerate() {
-            kept.copy_from_slice(&targets[self.patches[lane]].positions);
+        for lane in 0..R::LANES {
+            self.lane_states[lane].has_velocity = has_velocity(lane);
+        }
+        for (kept, motion) in self.end_positions.iter_mut().zip(&motions) {
+            kept.copy_from_slice(&motion.positions);
         }
     }
 
@@ -124,6 +138,7 @@ impl<R: Real> Group<R> {
             );
             pressure = half * self.pressure * volume * volume;
         }
+        self.squared_distance = magnet;
         [
             half * self.mass * kinetic,
             half * self.magnet.stiffness * magnet,

@@ -23,13 +23,6 @@ pub(crate) struct Substep {
     pub(crate) wind: [f64; 3],
 }
 
-impl Substep {
-    /// Whether acceleration differs from node to node.
-    pub(super) fn has_field(&self) -> bool {
-        self.angular != [[0.0; 3]; 2] || self.wind != [0.0; 3]
-    }
-}
-
 /// The pairs of a group's nodes with nodes of other patches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GroupPairs {
@@ -78,10 +71,15 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Starts a frame of `dt` seconds.
     fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);
-    /// First half of a substep: up to the inertial target. Fills `ports`.
+    /// Before the constraints of a substep: up to the inertial target. Fills `ports`.
     fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>);
-    /// Second half of a substep: the constraints. Reads the ports of all groups.
+    /// The constraints of a substep. Reads the ports of all groups.
     fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]);
+    /// After the constraints of a substep: the new state.
+    fn finish(&mut self);
+    /// [`PatchGroup::finish`], and then [`PatchGroup::predict`] for the substep that follows in
+    /// the same frame, in one pass.
+    fn turn(&mut self, following: &Substep, ports: &mut Vec<Port>);
     /// Ends the frame: what the monitor sees, per patch.
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>);
     /// Takes backward Euler steps for a patch for `frames` frames.

@@ -6,6 +6,8 @@
 mod dispatch;
 mod frame;
 mod interface;
+mod pairs;
+mod solve;
 mod state;
 mod substep;
 

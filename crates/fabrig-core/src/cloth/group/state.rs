@@ -77,7 +77,7 @@ pub(crate) struct Group<R> {
     pub(super) previous_displacements: Vec<Vec3<R>>,
     pub(super) velocities: Vec<Vec3<R>>,
     pub(super) previous_velocities: Vec<Vec3<R>>,
-    /// How far the targets moved in the last substep. (mm)
+    /// How far the targets moved in the last substep of the frame before. (mm)
     pub(super) target_steps: Vec<Vec3<R>>,
 
     /// Targets at the start of the frame, relative to the centre. (mm)
@@ -108,9 +108,15 @@ pub(crate) struct Group<R> {
     /// Effective step for which `inv_masses` holds.
     pub(super) masses_h_e: R,
     pub(super) h_e: R,
+    /// 1/h_e of the substep that is being finished. (1/s)
+    pub(super) inv_h: R,
+    /// Hermite weights of the targets before and after the substep.
+    pub(super) weights: [[f64; 3]; 2],
     pub(super) clamped: R,
     pub(super) drive: R,
     pub(super) mismatch: R,
+    /// Sum of squared displacements at the end of the frame. [mm^2]
+    pub(super) squared_distance: R,
     pub(super) lane_states: Vec<LaneState>,
 }
 
@@ -248,9 +254,12 @@ impl<R: Real> Group<R> {
             gradient: zero,
             masses_h_e: R::splat(-1.0),
             h_e: R::splat(0.0),
+            inv_h: R::splat(0.0),
+            weights: [[0.0; 3]; 2],
             clamped: R::splat(0.0),
             drive: R::splat(0.0),
             mismatch: R::splat(0.0),
+            squared_distance: R::splat(0.0),
             lane_states: vec![LaneState::default(); R::LANES],
         }
     }

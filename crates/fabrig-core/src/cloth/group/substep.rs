@@ -1,22 +1,82 @@
-//! One substep: prediction, constraints, new state.
+//! Around the sweep of a substep: the inertial target before it, the new state after it.
+//!
+//! Where one substep follows another, both are done in one pass over the nodes
+//! ([`Group::turn_lanes`]): the state goes through memory once.
 
 use super::interface::Substep;
 use super::state::Group;
-use crate::cloth::constraints::attachment::{OrderFreeSum, Port, anchor_pull, project_pair};
-use crate::cloth::constraints::bend::{BendCompliance, project_bend};
+use crate::cloth::constraints::attachment::anchor_pull;
 use crate::cloth::constraints::damping::damping_mass;
 use crate::cloth::constraints::inertia::{FrameForces, frame_acceleration};
-use crate::cloth::constraints::pressure::project_pressure;
-use crate::cloth::constraints::shear::project_shear;
-use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
 use crate::cloth::constraints::wind::add_wind;
 use crate::cloth::input::Integrator;
 use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::time::{Stencil, hermite};
 
+/// A node's motion: displacements from the target (mm) and velocities (mm/s), now and a
+/// substep ago.
+#[derive(Debug, Clone, Copy)]
+struct NodeMotion<R> {
+    u: Vec3<R>,
+    previous_u: Vec3<R>,
+    v: Vec3<R>,
+    previous_v: Vec3<R>,
+}
+
+/// What predicting a substep has in common for all nodes.
+#[derive(Debug, Clone, Copy)]
+struct Prediction<R> {
+    history: R,
+    h_e: R,
+    /// Added masses that draw to X, and to X + u_b. [mass]
+    pull: R,
+    follow: R,
+    /// Hermite weights of the target, of its step now, and of its step before, where that was
+    /// in the same frame.
+    target: [R; 3],
+    step: [R; 3],
+    last_step: [R; 3],
+}
+
+/// Acceleration of the nodes. (mm/s^2)
+trait Field<R> {
+    /// Of node `i`, expected at `x` (mm, relative to the centre) with velocity `v` (mm/s).
+    fn at(&self, i: usize, x: Vec3<R>, v: Vec3<R>) -> Vec3<R>;
+}
+
+/// The same for all nodes.
+struct Uniform<R>(Vec3<R>);
+
+/// Of a turning head; the second is the centre of the patches. (mm)
+struct Turning<R>(FrameForces<R>, Vec3<R>);
+
+/// Evaluated beforehand.
+struct Listed<'a, R>(&'a [Vec3<R>]);
+
+impl<R: Real> Field<R> for Uniform<R> {
+    #[inline(always)]
+    fn at(&self, _: usize, _: Vec3<R>, _: Vec3<R>) -> Vec3<R> {
+        self.0
+    }
+}
+
+impl<R: Real> Field<R> for Turning<R> {
+    #[inline(always)]
+    fn at(&self, _: usize, x: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
+        frame_acceleration(&self.0, self.1 + x, v)
+    }
+}
+
+impl<R: Real> Field<R> for Listed<'_, R> {
+    #[inline(always)]
+    fn at(&self, i: usize, _: Vec3<R>, _: Vec3<R>) -> Vec3<R> {
+        self.0[i]
+    }
+}
+
 impl<R: Real> Group<R> {
     /// Weights of the substep, lane by lane: patches that fell back take Euler steps.
-    pub(super) fn stencils(&self, substep: &Substep) -> [R; 2] {
+    fn stencils(&self, substep: &Substep) -> [R; 2] {
         let mut weights = [R::splat(0.0); 2];
         for lane in 0..R::LANES {
             let state = &self.lane_states[lane];
@@ -35,7 +95,7 @@ impl<R: Real> Group<R> {
     }
 
     #[inline(always)]
-    pub(super) fn refresh_masses(&mut self) {
+    fn refresh_masses(&mut self) {
         let h_e = self.h_e;
         let same = (0..R::LANES).all(|l| h_e.lane(l) == self.masses_h_e.lane(l));
         if same {
@@ -50,218 +110,221 @@ impl<R: Real> Group<R> {
         }
     }
 
-    /// Acceleration of every node where the stencil expects it at the end of the substep.
+    /// Takes up a substep: its stencil, masses and weights.
     #[inline(always)]
-    pub(super) fn evaluate_fields(&mut self, substep: &Substep) {
-        let forces = FrameForces {
-            uniform: Vec3::splat(substep.uniform),
-            angular_velocity: Vec3::splat(substep.angular[0]),
-            angular_acceleration: Vec3::splat(substep.angular[1]),
+    fn begin_substep(&mut self, substep: &Substep) -> Prediction<R> {
+        let [history, h_e] = self.stencils(substep);
+        self.h_e = h_e;
+        self.refresh_masses();
+        let last = self.weights;
+        self.weights = [hermite(substep.progress[0]), hermite(substep.progress[1])];
+        let difference = |[a, b]: [[f64; 3]; 2]| {
+            [
+                R::splat(b[0] - a[0]),
+                R::splat(b[1] - a[1]),
+                R::splat(b[2] - a[2]),
+            ]
         };
+        let after = self.weights[1];
+        Prediction {
+            history,
+            h_e,
+            pull: self.magnet.stiffness * (h_e * h_e),
+            follow: self.magnet.past_mass(self.mass, h_e),
+            target: [R::splat(after[0]), R::splat(after[1]), R::splat(after[2])],
+            step: difference(self.weights),
+            last_step: difference(last),
+        }
+    }
+
+    /// First half of the first substep of a frame: up to the inertial target.
+    #[inline(always)]
+    pub(super) fn predict_lanes(&mut self, substep: &Substep) {
+        let prediction = self.begin_substep(substep);
+        self.predict_all::<false>(substep, &prediction);
+        self.pull_to_anchors();
+    }
+
+    /// End of a substep and first half of the one that follows in the same frame.
+    #[inline(always)]
+    pub(super) fn turn_lanes(&mut self, substep: &Substep) {
+        if substep.wind == [0.0; 3] {
+            // The new state needs the old effective step.
+            let inv_h = R::splat(1.0) / self.h_e;
+            let prediction = self.begin_substep(substep);
+            self.inv_h = inv_h;
+            self.predict_all::<true>(substep, &prediction);
+            self.pull_to_anchors();
+        } else {
+            self.finish_lanes();
+            self.predict_lanes(substep);
+        }
+    }
+
+    /// End of a substep: new displacements and velocities from the solution.
+    #[inline(always)]
+    pub(super) fn finish_lanes(&mut self) {
+        self.inv_h = R::splat(1.0) / self.h_e;
+        let [before, after] = self.weights;
+        let weights = [
+            R::splat(after[0] - before[0]),
+            R::splat(after[1] - before[1]),
+            R::splat(after[2] - before[2]),
+        ];
+        for i in 0..self.solution.len() {
+            let step = self.weighted(i, weights);
+            let now = self.finish_node(i, step);
+            self.target_steps[i] = step;
+            self.displacements[i] = now.u;
+            self.previous_displacements[i] = now.previous_u;
+            self.velocities[i] = now.v;
+            self.previous_velocities[i] = now.previous_v;
+        }
+    }
+
+    #[inline(always)]
+    fn predict_all<const IS_TURN: bool>(&mut self, substep: &Substep, p: &Prediction<R>) {
+        let [w, dw] = substep.angular;
+        let squared = if substep.wind != [0.0; 3] {
+            self.evaluate_fields(substep, p);
+            let accelerations = std::mem::take(&mut self.accelerations);
+            let sum = self.predict_in::<IS_TURN, _>(&Listed(&accelerations), p);
+            self.accelerations = accelerations;
+            sum
+        } else if [w, dw] != [[0.0; 3]; 2] {
+            let forces = FrameForces::new(substep.uniform, w, dw);
+            self.predict_in::<IS_TURN, _>(&Turning(forces, self.origin), p)
+        } else {
+            self.predict_in::<IS_TURN, _>(&Uniform(Vec3::splat(substep.uniform)), p)
+        };
+        self.drive += (R::splat(0.5) * self.mass * squared).sqrt() * R::splat(substep.h);
+    }
+
+    /// Predicts every node, with the end of the substep before if `IS_TURN`. Returns the sum
+    /// of squared accelerations.
+    #[inline(always)]
+    fn predict_in<const IS_TURN: bool, F: Field<R>>(&mut self, field: &F, p: &Prediction<R>) -> R {
+        let h_e2 = p.h_e * p.h_e;
+        let mut squared = R::splat(0.0);
+        for i in 0..self.solution.len() {
+            let (m, last_step);
+            if IS_TURN {
+                last_step = self.weighted(i, p.last_step);
+                m = self.finish_node(i, last_step);
+                self.displacements[i] = m.u;
+                self.velocities[i] = m.v;
+            } else {
+                last_step = self.target_steps[i];
+                m = self.node_motion(i);
+            }
+            let target = self.starts[i] + self.weighted(i, p.target);
+            let step = self.weighted(i, p.step);
+            // As u + r (u - u'): weights that are rounded to a sum other than 1 would be a force.
+            let change = m.u - m.previous_u;
+            let ub = m.u + change * p.history;
+            let now = m.u - step;
+            let then = m.previous_u - last_step - step;
+            let xb = now + (now - then) * p.history;
+            let gain = m.v - m.previous_v;
+            let vb = m.v + gain * p.history;
+            let acceleration = field.at(i, target + m.u + change, m.v + gain);
+            squared += acceleration.dot(acceleration);
+            // The mass-weighted mean of y, x_b, X + u_b and X, as a change of x_b: the rounding
+            // of the weights' sum then does not act on x_b.
+            let coasting = vb * p.h_e + acceleration * h_e2;
+            let draw = p.pull + self.anchor_stiffness[i] * h_e2;
+            let top = coasting * self.mass + (ub - xb) * p.follow - xb * draw;
+            self.targets[i] = target;
+            self.past[i] = xb;
+            self.resting[i] = target + ub;
+            self.solution[i] = xb + top * self.inv_masses[i];
+        }
+        squared
+    }
+
+    /// Part of a node's Hermite segment. (mm)
+    #[inline(always)]
+    fn weighted(&self, i: usize, [chord, start, end]: [R; 3]) -> Vec3<R> {
+        self.chords[i] * chord + self.start_slopes[i] * start + self.end_slopes[i] * end
+    }
+
+    #[inline(always)]
+    fn node_motion(&self, i: usize) -> NodeMotion<R> {
+        NodeMotion {
+            u: self.displacements[i],
+            previous_u: self.previous_displacements[i],
+            v: self.velocities[i],
+            previous_v: self.previous_velocities[i],
+        }
+    }
+
+    /// New motion of a node from the solution; its target moved by `target_step`. The
+    /// displacement is held to half an edge, measured against the head or against the moving
+    /// target, whichever is less: a cloth that follows its target and one that ignores it both
+    /// move as they should.
+    #[inline(always)]
+    fn finish_node(&mut self, i: usize, target_step: Vec3<R>) -> NodeMotion<R> {
+        let limit = self.clamp_squared;
+        let old = self.displacements[i];
+        let mut step = self.solution[i] - self.targets[i] - old;
+        let moved = step + target_step;
+        let (relative, absolute) = (step.dot(step), moved.dot(moved));
+        let squared = R::select_less(relative, absolute, relative, absolute);
+        if R::any_less(limit, squared) {
+            self.clamped += R::select_less(limit, squared, R::splat(1.0), R::splat(0.0));
+            step = step * (limit / squared.max(limit)).sqrt();
+        }
+        let u = old + step;
+        NodeMotion {
+            u,
+            previous_u: old,
+            v: (u - self.past[i]) * self.inv_h,
+            previous_v: self.velocities[i],
+        }
+    }
+
+    /// Accelerations of all nodes where the stencil expects them at the end of the substep,
+    /// with the wind.
+    #[inline(always)]
+    fn evaluate_fields(&mut self, substep: &Substep, p: &Prediction<R>) {
+        let [w, dw] = substep.angular;
+        let forces = FrameForces::new(substep.uniform, w, dw);
         let two = R::splat(2.0);
         // Extrapolated state, in arrays that are free until later in the substep.
         for i in 0..self.targets.len() {
-            let u = self.displacements[i] * two - self.previous_displacements[i];
-            let v = self.velocities[i] * two - self.previous_velocities[i];
-            let x = self.targets[i] + u;
+            let m = self.node_motion(i);
+            let target = self.starts[i] + self.weighted(i, p.target);
+            let x = target + (m.u * two - m.previous_u);
+            let v = m.v * two - m.previous_v;
             self.solution[i] = x;
             self.past[i] = v;
             self.accelerations[i] = frame_acceleration(&forces, self.origin + x, v);
         }
-        if substep.wind != [0.0; 3] {
-            add_wind(
-                &self.lists.cells,
-                &self.solution,
-                &self.past,
-                Vec3::splat(substep.wind),
-                &self.air,
-                self.inv_air_mass,
-                &mut self.accelerations,
-            );
-        }
-        let mut sum = R::splat(0.0);
-        for a in &self.accelerations {
-            sum += a.dot(*a);
-        }
-        self.drive += (R::splat(0.5) * self.mass * sum).sqrt() * R::splat(substep.h);
+        add_wind(
+            &self.lists.cells,
+            &self.solution,
+            &self.past,
+            Vec3::splat(substep.wind),
+            &self.air,
+            self.inv_air_mass,
+            &mut self.accelerations,
+        );
     }
 
-    #[inline(always)]
-    pub(super) fn predict_lanes(&mut self, substep: &Substep) {
-        let [history, h_e] = self.stencils(substep);
-        self.h_e = h_e;
-        self.refresh_masses();
-        let before = hermite(substep.progress[0]);
-        let after = hermite(substep.progress[1]);
-        let [c, a, b] = after.map(R::splat);
-        let [dc, da, db] = [0, 1, 2].map(|i| R::splat(after[i] - before[i]));
-        let has_field = substep.has_field();
-        let n = self.targets.len();
-        for i in 0..n {
-            let (chord, start, end) = (self.chords[i], self.start_slopes[i], self.end_slopes[i]);
-            self.targets[i] = self.starts[i] + (chord * c + start * a + end * b);
-        }
-        if has_field {
-            self.evaluate_fields(substep);
-        } else if substep.uniform != [0.0; 3] {
-            let squared: f64 = substep.uniform.iter().map(|x| x * x).sum();
-            let half = R::splat(0.5 * squared * n as f64);
-            self.drive += (self.mass * half).sqrt() * R::splat(substep.h);
-        }
-        let uniform = Vec3::splat(substep.uniform);
-        let follow = self.magnet.past_mass(self.mass, h_e);
-        let h_e2 = h_e * h_e;
-        let pull = self.magnet.stiffness * h_e2;
-        for i in 0..n {
-            let (chord, start, end) = (self.chords[i], self.start_slopes[i], self.end_slopes[i]);
-            let step = chord * dc + start * da + end * db;
-            let (u, up) = (self.displacements[i], self.previous_displacements[i]);
-            // As u + r (u - u'): weights that are rounded to a sum other than 1 would be a force.
-            let ub = u + (u - up) * history;
-            let now = u - step;
-            let then = up - self.target_steps[i] - step;
-            let xb = now + (now - then) * history;
-            let (v, vp) = (self.velocities[i], self.previous_velocities[i]);
-            let vb = v + (v - vp) * history;
-            let acceleration = if has_field {
-                self.accelerations[i]
-            } else {
-                uniform
-            };
-            // The mass-weighted mean of y, x_b, X + u_b and X, as a change of x_b: the rounding
-            // of the weights' sum then does not act on x_b.
-            let coasting = vb * h_e + acceleration * h_e2;
-            let draw = pull + self.anchor_stiffness[i] * h_e2;
-            let top = coasting * self.mass + (ub - xb) * follow - xb * draw;
-            self.target_steps[i] = step;
-            self.past[i] = xb;
-            self.resting[i] = self.targets[i] + ub;
-            self.solution[i] = xb + top * self.inv_masses[i];
-        }
+    /// Draws anchored nodes to their anchors.
+    fn pull_to_anchors(&mut self) {
+        let weights = self.weights[1];
         for anchor in &self.anchors {
             let (node, lane) = (anchor.node, anchor.lane);
-            let weights = after;
             let target = self.targets[node].lane(lane);
             let offset = [0, 1, 2].map(|axis| {
                 let moved: f64 = (0..3).map(|k| weights[k] * anchor.segment[k][axis]).sum();
                 anchor.start[axis] + moved - target[axis]
             });
-            let (pull, _) = anchor_pull(offset, anchor.stiffness, h_e.lane(lane));
+            let (pull, _) = anchor_pull(offset, anchor.stiffness, self.h_e.lane(lane));
             let w = self.inv_masses[node].lane(lane);
             let u = self.solution[node].lane(lane);
             self.solution[node].set_lane(lane, [0, 1, 2].map(|k| u[k] + pull[k] * w));
-        }
-    }
-
-    pub(super) fn write_ports(&self, ports: &mut Vec<Port>) {
-        ports.clear();
-        for (&(node, lane), partners) in self.pairs.nodes.iter().zip(&self.pairs.partners) {
-            let (node, lane) = (node as usize, lane as usize);
-            ports.push(Port {
-                displacement: self.solution[node].lane(lane),
-                inv_mass: self.inv_masses[node].lane(lane),
-                pair_count: partners.len() as f64,
-            });
-        }
-    }
-
-    pub(super) fn solve_pairs(&mut self, ports: &[Vec<Port>]) {
-        let pairs = &self.pairs;
-        for (&(node, lane), partners) in pairs.nodes.iter().zip(&pairs.partners) {
-            let (node, lane) = (node as usize, lane as usize);
-            let h_e = self.h_e.lane(lane);
-            let own = Port {
-                displacement: self.solution[node].lane(lane),
-                inv_mass: self.inv_masses[node].lane(lane),
-                pair_count: partners.len() as f64,
-            };
-            let mut sum = OrderFreeSum::default();
-            for partner in partners {
-                let other = &ports[partner.group][partner.port];
-                let compliance = 1.0 / (partner.stiffness * h_e * h_e);
-                sum.add(project_pair(&own, other, compliance));
-            }
-            let total = sum.total();
-            let moved = [0, 1, 2].map(|axis| own.displacement[axis] + total[axis]);
-            self.solution[node].set_lane(lane, moved);
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn solve_lanes(&mut self, substep: &Substep) {
-        let h_e2 = self.h_e * self.h_e;
-        let one = R::splat(1.0);
-        let progress = R::splat(substep.progress[1]);
-        if self.has_pressure {
-            project_pressure(
-                &self.lists.cells,
-                &self.targets,
-                &mut self.solution,
-                &self.inv_masses,
-                one / (self.pressure * h_e2),
-                &mut self.gradient,
-            );
-        }
-        let bend = BendCompliance {
-            compliance: one / (self.bend * h_e2),
-            dropoff: self.bend_dropoff,
-            inv_edge_squared: self.inv_edge_squared,
-        };
-        project_bend(
-            &self.lists.triples,
-            &mut self.solution,
-            &self.inv_masses,
-            &bend,
-        );
-        for (x, target) in self.solution.iter_mut().zip(&self.targets) {
-            *x = *target + *x;
-        }
-        project_shear(
-            &self.lists.diagonals,
-            &mut self.solution,
-            &self.inv_masses,
-            &self.diagonal_lengths,
-            progress,
-            one / (self.shear * h_e2),
-        );
-        let compliance = StretchCompliance {
-            stretch: one / (self.stretch[0] * h_e2),
-            compression: one / (self.stretch[1] * h_e2),
-            gamma: self.stretch_damping_time / self.h_e,
-        };
-        project_stretch(
-            &self.lists.edges,
-            &mut self.solution,
-            &self.inv_masses,
-            &self.edge_lengths,
-            &self.resting,
-            progress,
-            &compliance,
-        );
-        self.finish_lanes();
-    }
-
-    /// New displacements and velocities from the solution. Displacements are held to half an
-    /// edge, measured against the head or against the moving target, whichever is less: a
-    /// cloth that follows its target and one that ignores it both move as they should.
-    #[inline(always)]
-    pub(super) fn finish_lanes(&mut self) {
-        let (zero, one) = (R::splat(0.0), R::splat(1.0));
-        let inv_h = one / self.h_e;
-        let limit = self.clamp_squared;
-        for i in 0..self.solution.len() {
-            let old = self.displacements[i];
-            let step = self.solution[i] - self.targets[i] - old;
-            let moved = step + self.target_steps[i];
-            let (relative, absolute) = (step.dot(step), moved.dot(moved));
-            let squared = R::select_less(relative, absolute, relative, absolute);
-            self.clamped += R::select_less(limit, squared, one, zero);
-            let scale = (limit / squared.max(limit)).sqrt();
-            let new = old + step * scale;
-            self.previous_displacements[i] = old;
-            self.displacements[i] = new;
-            self.previous_velocities[i] = self.velocities[i];
-            self.velocities[i] = (new - self.past[i]) * inv_h;
         }
     }
 }
