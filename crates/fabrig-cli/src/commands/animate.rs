@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use fabrig_core::motion::{self, Clip, ReadOptions};
+use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{Dynamics, Scene};
@@ -17,7 +17,7 @@ use crate::console::Console;
 pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
     check_output(&args.output)?;
     let rig = load_rig(&args.rig)?;
-    let clip = motion::read(&args.motion, &read_options(&args.take))?;
+    let clip = read_take(&args.motion, &args.take)?;
     let options = AnimateOptions {
         fps: args.scene.fps,
         rig_name: stem(&args.rig),
@@ -38,13 +38,30 @@ pub(super) fn load_rig(path: &Path) -> Result<Rig> {
     Rig::load(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 
-pub(super) fn read_options(args: &TakeArgs) -> ReadOptions {
+fn read_options(args: &TakeArgs) -> ReadOptions {
     ReadOptions {
+        format: args.motion_format.map(Into::into),
         frame_rate: args.motion_fps,
+        times_in_milliseconds: args.motion_milliseconds,
         ignore_unknown_columns: args.ignore_unknown_columns,
         clamp_weights: args.clamp_weights,
+        adjust: Adjustment {
+            swap_sides: args.swap_sides,
+            neutral: args.calibrate_neutral,
+            gains: args.gain.clone(),
+            limit_mouth_close: !args.keep_mouth_close,
+        },
         ..ReadOptions::default()
     }
+}
+
+/// Reads a take as the arguments say.
+pub(super) fn read_take(path: &Path, args: &TakeArgs) -> Result<Clip> {
+    let clip = motion::read(path, &read_options(args))?;
+    Ok(match args.resample {
+        Some(rate) => clip.resampled(rate)?,
+        None => clip,
+    })
 }
 
 /// Simulates and records with a progress bar, and writes the viewers' files beside it.
@@ -110,20 +127,7 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
             t.median, t.p95, t.p99, t.max
         )
     };
-    let take = &report.take;
-    for (count, what) in [
-        (take.clamped_weights, "weights just outside [0, 1] clamped"),
-        (take.duplicate_rows, "rows at a repeated time replaced"),
-        (
-            take.dropped_frames,
-            "frames missing from the capture bridged",
-        ),
-        (take.ignored_columns.len(), "unknown columns passed over"),
-    ] {
-        if count > 0 {
-            line("take", format!("{count} {what}"));
-        }
-    }
+    print_notes(console, &report.take);
     line(
         "frames",
         format!(
@@ -156,4 +160,30 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
         format!("{:.1} MB", report.recording.bytes as f64 / 1e6),
     );
     line("time", format!("{:.2} s", report.wall_secs));
+}
+
+/// What reading a take had to decide, for people.
+pub(super) fn print_notes(console: &Console, take: &ClipNotes) {
+    let lost: usize = take.gaps.iter().map(|gap| gap.frames).sum();
+    for (count, what) in [
+        (take.clamped_weights, "weights just outside [0, 1] clamped"),
+        (take.duplicate_rows, "rows at a repeated time replaced"),
+        (
+            take.dropped_frames,
+            "frames missing from the capture bridged",
+        ),
+        (lost, "frames without a face filled"),
+        (take.other_faces, "rows of other faces passed over"),
+        (take.ignored_columns.len(), "columns passed over"),
+        (take.neutral.len(), "shapes freed of the neutral face"),
+        (take.saturated_weights, "weights taken to 1 by a gain"),
+        (
+            take.limited_mouth_close,
+            "weights of mouthClose lowered to jawOpen's",
+        ),
+    ] {
+        if count > 0 {
+            console.result(&format!("{:<20}{count} {what}", "take"));
+        }
+    }
 }

@@ -81,17 +81,17 @@ pub enum FacsError {
 }
 
 /// Coefficients of shapes: (shape name, coefficient), by name.
-type ShapeCoefficients = BTreeMap<String, f32>;
+pub(super) type ShapeCoefficients = BTreeMap<String, f32>;
 
 /// What one side, the other, or both of an action do to the shapes.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-struct Action {
+pub(super) struct Action {
     #[serde(default)]
-    left: ShapeCoefficients,
+    pub(super) left: ShapeCoefficients,
     #[serde(default)]
-    right: ShapeCoefficients,
+    pub(super) right: ShapeCoefficients,
     #[serde(default)]
-    both: ShapeCoefficients,
+    pub(super) both: ShapeCoefficients,
 }
 
 /// One action unit of a table.
@@ -161,7 +161,19 @@ struct TableText {
     units: BTreeMap<String, UnitText>,
 }
 
+/// Text of the table that comes with the crate.
+const BUNDLED: &str = include_str!("../../../../templates/human/action_units.toml");
+
 impl ActionUnitTable {
+    /// The table of the bundled template.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::parse`]; not for the table that the crate was built with.
+    pub fn bundled() -> Result<Self, FacsError> {
+        Self::parse(BUNDLED)
+    }
+
     /// Reads a table; units come out in the order of their numbers.
     ///
     /// # Errors
@@ -230,7 +242,7 @@ impl ActionUnitTable {
         Ok(())
     }
 
-    fn actions(&self) -> impl Iterator<Item = (String, &Action)> {
+    pub(super) fn actions(&self) -> impl Iterator<Item = (String, &Action)> {
         let units = self.units.iter().map(|u| (u.code.clone(), &u.action));
         let correctives = self.correctives.iter().enumerate();
         units.chain(correctives.map(|(i, c)| (format!("corrective {i}"), &c.action)))
@@ -253,6 +265,11 @@ impl ActionUnitTable {
             .position(|unit| unit.code.eq_ignore_ascii_case(code))
     }
 
+    /// Index of the unit with this number: 12 for `AU12`.
+    pub fn unit_by_number(&self, number: u32) -> Option<usize> {
+        self.unit_index(&format!("AU{number}"))
+    }
+
     /// Codes of the units that move `shape`: the way from shapes back to action units.
     pub fn units_of_shape(&self, shape: &str) -> Vec<&str> {
         self.units
@@ -263,155 +280,10 @@ impl ActionUnitTable {
     }
 }
 
-/// Intensity of one unit on each side, in [0, 1].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct UnitIntensity {
-    /// On the character's left.
-    pub left: f32,
-    /// On the character's right.
-    pub right: f32,
-}
-
-impl UnitIntensity {
-    /// The same on both sides.
-    pub fn both(intensity: f32) -> Self {
-        Self {
-            left: intensity,
-            right: intensity,
-        }
-    }
-
-    fn mean(self) -> f32 {
-        0.5 * (self.left + self.right)
-    }
-}
-
-/// Coefficients of one action with shapes as indices.
-#[derive(Debug, Clone, PartialEq)]
-struct SparseAction {
-    left: Vec<(usize, f32)>,
-    right: Vec<(usize, f32)>,
-    both: Vec<(usize, f32)>,
-}
-
-impl SparseAction {
-    fn add_to(&self, intensity: UnitIntensity, weights: &mut [f32]) {
-        for (coefficients, amount) in [
-            (&self.left, intensity.left),
-            (&self.right, intensity.right),
-            (&self.both, intensity.mean()),
-        ] {
-            for &(shape, coefficient) in coefficients {
-                weights[shape] += coefficient * amount;
-            }
-        }
-    }
-}
-
-/// A table bound to a list of shapes: A and the correctives as indices.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ActionUnitMap {
-    codes: Vec<String>,
-    units: Vec<SparseAction>,
-    correctives: Vec<(Vec<usize>, SparseAction)>,
-    shape_count: usize,
-}
-
-impl ActionUnitMap {
-    /// Binds `table` to shapes, whose order is then the order of the weights.
-    ///
-    /// # Errors
-    ///
-    /// [`FacsError::UnknownShape`] where the table names a shape that is not among them.
-    pub fn new(table: &ActionUnitTable, shapes: &[&str]) -> Result<Self, FacsError> {
-        let bind = |label: &str, coefficients: &ShapeCoefficients| {
-            coefficients
-                .iter()
-                .map(|(name, &coefficient)| {
-                    let shape = shapes.iter().position(|s| s == name);
-                    let shape = shape.ok_or_else(|| FacsError::UnknownShape {
-                        unit: label.to_owned(),
-                        shape: name.clone(),
-                        nearest: super::nearest_name(name, shapes.iter().copied())
-                            .unwrap_or_default()
-                            .to_owned(),
-                    })?;
-                    Ok((shape, coefficient))
-                })
-                .collect::<Result<Vec<_>, FacsError>>()
-        };
-        let mut actions = table
-            .actions()
-            .map(|(label, action)| {
-                Ok(SparseAction {
-                    left: bind(&label, &action.left)?,
-                    right: bind(&label, &action.right)?,
-                    both: bind(&label, &action.both)?,
-                })
-            })
-            .collect::<Result<Vec<_>, FacsError>>()?;
-        let corrective_actions = actions.split_off(table.units.len());
-        let correctives = table.correctives.iter().map(|corrective| {
-            let units = corrective.when.iter();
-            units
-                .filter_map(|code| table.unit_index(code))
-                .collect::<Vec<usize>>()
-        });
-        Ok(Self {
-            codes: table.units.iter().map(|u| u.code.clone()).collect(),
-            units: actions,
-            correctives: correctives.zip(corrective_actions).collect(),
-            shape_count: shapes.len(),
-        })
-    }
-
-    /// Weights of the shapes for one intensity per unit of the table.
-    ///
-    /// # Errors
-    ///
-    /// [`FacsError`] when the count is wrong or an intensity is not in [0, 1].
-    pub fn weights(&self, intensities: &[UnitIntensity]) -> Result<Vec<f32>, FacsError> {
-        if intensities.len() != self.units.len() {
-            return Err(FacsError::IntensityCount {
-                expected: self.units.len(),
-                found: intensities.len(),
-            });
-        }
-        for (code, intensity) in self.codes.iter().zip(intensities) {
-            for found in [intensity.left, intensity.right] {
-                if !(0.0..=1.0).contains(&found) {
-                    return Err(FacsError::IntensityOutOfRange {
-                        unit: code.clone(),
-                        found,
-                    });
-                }
-            }
-        }
-        let mut weights = vec![0.0; self.shape_count];
-        for (unit, &intensity) in self.units.iter().zip(intensities) {
-            unit.add_to(intensity, &mut weights);
-        }
-        for (units, action) in &self.correctives {
-            let product =
-                units
-                    .iter()
-                    .fold(UnitIntensity::both(1.0), |product, &u| UnitIntensity {
-                        left: product.left * intensities[u].left,
-                        right: product.right * intensities[u].right,
-                    });
-            action.add_to(product, &mut weights);
-        }
-        for weight in &mut weights {
-            *weight = weight.clamp(0.0, 1.0);
-        }
-        Ok(weights)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::facs::ARKIT_SHAPES;
+    use crate::facs::{ARKIT_SHAPES, ActionUnitMap, UnitIntensity};
 
     const TABLE: &str = r#"
         [AU12]

@@ -56,6 +56,13 @@ pub const ARKIT_SHAPES: [&str; 52] = [
     "tongueOut",
 ];
 
+/// Index of `jawOpen` in [`ARKIT_SHAPES`].
+pub const JAW_OPEN: usize = 17;
+
+/// Index of `mouthClose` in [`ARKIT_SHAPES`]: the corrective that brings the lips together
+/// while the jaw is open, which makes sense up to the weight of `jawOpen` only.
+pub const MOUTH_CLOSE: usize = 18;
+
 /// Shapes that move something to the left and have an opposite that moves it to the right.
 const OPPOSITES: [&str; 2] = ["jawLeft", "mouthLeft"];
 
@@ -94,6 +101,22 @@ pub fn match_shape(name: &str) -> Option<ShapeMatch> {
         return None;
     }
     Some(ShapeMatch::Both(left, right))
+}
+
+/// The shape that does on the other side what `shape` does; itself where it has no side.
+///
+/// # Panics
+///
+/// If `shape` is no index into [`ARKIT_SHAPES`].
+pub fn mirrored_shape(shape: usize) -> usize {
+    let name = ARKIT_SHAPES[shape];
+    let other = match (name.strip_suffix("Left"), name.strip_suffix("Right")) {
+        (Some(stem), _) => format!("{stem}Right"),
+        (_, Some(stem)) => format!("{stem}Left"),
+        _ => return shape,
+    };
+    let found = ARKIT_SHAPES.iter().position(|s| *s == other);
+    found.unwrap_or(shape)
 }
 
 /// The candidate that is spelled most like `name`, letter case and separators aside.
@@ -214,6 +237,22 @@ mod tests {
             (ARKIT_SHAPES[left], ARKIT_SHAPES[right]),
             ("eyeBlinkLeft", "eyeBlinkRight")
         );
+    }
+
+    #[test]
+    fn shapes_have_mirrors_and_the_named_indices_are_right() {
+        assert_eq!(ARKIT_SHAPES[JAW_OPEN], "jawOpen");
+        assert_eq!(ARKIT_SHAPES[MOUTH_CLOSE], "mouthClose");
+        let mirror = |name: &str| {
+            let shape = ARKIT_SHAPES.iter().position(|s| *s == name).unwrap();
+            ARKIT_SHAPES[mirrored_shape(shape)]
+        };
+        assert_eq!(mirror("eyeBlinkLeft"), "eyeBlinkRight");
+        assert_eq!(mirror("jawRight"), "jawLeft");
+        assert_eq!(mirror("cheekPuff"), "cheekPuff");
+        for shape in 0..ARKIT_SHAPES.len() {
+            assert_eq!(mirrored_shape(mirrored_shape(shape)), shape);
+        }
     }
 
     #[test]

@@ -7,8 +7,12 @@
 
 mod action_unit;
 mod arkit;
+mod unit_map;
+mod unit_name;
 
-pub use action_unit::{
-    ActionUnit, ActionUnitMap, ActionUnitTable, Corrective, FacsError, UnitIntensity,
+pub use action_unit::{ActionUnit, ActionUnitTable, Corrective, FacsError};
+pub use arkit::{
+    ARKIT_SHAPES, JAW_OPEN, MOUTH_CLOSE, ShapeMatch, match_shape, mirrored_shape, nearest_name,
 };
-pub use arkit::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
+pub use unit_map::{ActionUnitMap, UnitIntensity};
+pub use unit_name::{Side, UnitName, match_unit};

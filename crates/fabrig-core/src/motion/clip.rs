@@ -1,5 +1,6 @@
 //! A take in memory: frames at rising times, and what lies between them.
 
+use super::frames::{RATES, usual_rate};
 use super::interpolate::{Tangents, find_span, interpolate};
 use super::pose::{EyeAngles, HeadPose};
 use crate::Vector;
@@ -46,6 +47,12 @@ pub enum ClipError {
         /// Its name.
         channel: String,
     },
+    /// A frame rate that no take has.
+    #[error("{found} frames per second are asked for; a take has 1 to 240")]
+    Rate {
+        /// The rate. (1/s)
+        found: f64,
+    },
     /// A head, eye or wind value is not finite.
     #[error("frame {frame} has a {what} value that is not finite")]
     NotFinite {
@@ -57,7 +64,7 @@ pub enum ClipError {
 }
 
 /// What reading a take had to decide; nothing of it happens unsaid.
-#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct ClipNotes {
     /// Weights a little outside [0, 1] that were clamped.
     pub clamped_weights: usize,
@@ -65,8 +72,29 @@ pub struct ClipNotes {
     pub duplicate_rows: usize,
     /// Frames that the capture dropped, judged by the usual step; the clip bridges them.
     pub dropped_frames: usize,
-    /// Columns that were passed over on request.
+    /// Columns that were passed over: on request, or because others say the same better.
     pub ignored_columns: Vec<String>,
+    /// Frames in which the face was lost, filled from those around them.
+    pub gaps: Vec<Gap>,
+    /// Rows of faces other than the first.
+    pub other_faces: usize,
+    /// Weights that a gain took beyond 1.
+    pub saturated_weights: usize,
+    /// Weights of `mouthClose` that were lowered to `jawOpen`'s.
+    pub limited_mouth_close: usize,
+    /// The rest of the captured face that was taken off, by shape; empty where none was.
+    pub neutral: std::collections::BTreeMap<String, f32>,
+}
+
+/// Frames in which the tracker lost the face.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Gap {
+    /// Time of the first of them. (s)
+    pub start: f64,
+    /// Time of the last. (s)
+    pub end: f64,
+    /// How many there are.
+    pub frames: usize,
 }
 
 /// Parts of a clip beside its weights. Each list is empty or has one entry per frame.
@@ -88,6 +116,23 @@ pub struct Clip {
     weights: Vec<f32>,
     tracks: ClipTracks,
     notes: ClipNotes,
+}
+
+/// A clip taken apart.
+pub(super) struct ClipParts {
+    pub(super) times: Vec<f64>,
+    pub(super) channels: Vec<String>,
+    pub(super) weights: Vec<f32>,
+    pub(super) tracks: ClipTracks,
+    pub(super) notes: ClipNotes,
+}
+
+impl ClipParts {
+    /// The clip again.
+    pub(super) fn into_clip(self) -> Result<Clip, ClipError> {
+        let clip = Clip::new(self.times, self.channels, self.weights)?;
+        Ok(clip.with_tracks(self.tracks)?.with_notes(self.notes))
+    }
 }
 
 /// The values of a clip at one time.
@@ -262,11 +307,64 @@ impl Clip {
 
     /// The usual number of frames per second; `None` for a single frame.
     pub fn frame_rate(&self) -> Option<f64> {
-        let mut steps: Vec<f64> = self.times.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps
-            .get(steps.len().saturating_sub(1) / 2)
-            .map(|step| 1.0 / step)
+        usual_rate(&self.times)
+    }
+
+    /// The clip at even times, `rate` frames per second, by its own interpolation: weights
+    /// stay in [0, 1], notes stay.
+    ///
+    /// # Errors
+    ///
+    /// [`ClipError::Rate`] where `rate` is not from 1 to 240.
+    pub fn resampled(&self, rate: f64) -> Result<Self, ClipError> {
+        if !(RATES[0]..=RATES[1]).contains(&rate) {
+            return Err(ClipError::Rate { found: rate });
+        }
+        // Room for rounding, so that a clip of whole frames keeps its last one.
+        let steps = (self.duration() * rate + 1e-6).floor() as usize;
+        let start = self.times[0];
+        Ok(self.sampled_at((0..=steps).map(|i| start + i as f64 / rate).collect()))
+    }
+
+    /// The clip's values at other times (rising).
+    pub(super) fn sampled_at(&self, times: Vec<f64>) -> Self {
+        let mut sample = Sample::default();
+        let mut weights = Vec::with_capacity(times.len() * self.channels.len());
+        let mut tracks = ClipTracks::default();
+        for &time in &times {
+            self.sample_into(time, &mut sample);
+            weights.extend_from_slice(&sample.weights);
+            if !self.tracks.head.is_empty() {
+                tracks.head.push(sample.head);
+            }
+            tracks.eyes.extend(sample.eyes);
+            if !self.tracks.wind.is_empty() {
+                tracks.wind.push(sample.wind);
+            }
+        }
+        // Interpolation is in f64; a weight may round to just outside.
+        for weight in &mut weights {
+            *weight = weight.clamp(0.0, 1.0);
+        }
+        Self {
+            times,
+            channels: self.channels.clone(),
+            weights,
+            tracks,
+            notes: self.notes.clone(),
+        }
+    }
+
+    /// The clip with its channels, weights and tracks taken out, to be changed and put back
+    /// by [`Self::new`].
+    pub(super) fn into_parts(self) -> ClipParts {
+        ClipParts {
+            times: self.times,
+            channels: self.channels,
+            weights: self.weights,
+            tracks: self.tracks,
+            notes: self.notes,
+        }
     }
 
     /// For each of `names` the channel that drives it.
@@ -364,6 +462,24 @@ mod tests {
             clip.channel_indices(&["mouthPucker", "tongueOut"]),
             [Some(1), None]
         );
+    }
+
+    #[test]
+    fn resampling_meets_the_clip_and_keeps_its_end() {
+        let clip = clip()
+            .with_tracks(ClipTracks {
+                wind: vec![Vector::zeros(), Vector::x(), Vector::zeros()],
+                ..ClipTracks::default()
+            })
+            .unwrap();
+        let fine = clip.resampled(60.0).unwrap();
+        assert_eq!(fine.frame_count(), 13);
+        assert_eq!(fine.sample(0.05).weights, clip.sample(0.05).weights);
+        assert_eq!(fine.weights()[24..], [0.25, 0.0]);
+        assert_eq!(fine.tracks().wind[6], Vector::x());
+        for rate in [0.5, 241.0, f64::NAN] {
+            assert!(matches!(clip.resampled(rate), Err(ClipError::Rate { .. })));
+        }
     }
 
     #[test]

@@ -117,6 +117,71 @@ pub enum MotionError {
         /// The time of the row before it. (s)
         previous: f64,
     },
+    /// The times make no take.
+    #[error(
+        "{name}: its times make {found:.4} frames per second, a take has 1 to 240; if they are \
+         milliseconds, ask for that"
+    )]
+    RateOutOfRange {
+        /// Name of the take.
+        name: String,
+        /// The usual rate. (1/s)
+        found: f64,
+    },
+    /// A line has not as many cells as the heading says.
+    #[error("{name}: row {row} has {found} cells where {expected} are expected")]
+    CellCount {
+        /// Name of the take.
+        name: String,
+        /// The line of the file, from 1.
+        row: usize,
+        /// Cells that there should be.
+        expected: usize,
+        /// Cells that there are.
+        found: usize,
+    },
+    /// JSON is not of the form that is read.
+    #[error("{name}: frame {frame}: {problem}")]
+    Json {
+        /// Name of the take.
+        name: String,
+        /// The frame, from 1; 0 for the document as a whole.
+        frame: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A frame scores something that is no shape.
+    #[error(
+        "{name}: frame {frame} scores '{found}', which is not known (nearest: '{nearest}'); ask \
+         for unknown columns to be ignored to pass over it"
+    )]
+    UnknownCategory {
+        /// Name of the take.
+        name: String,
+        /// The frame or line, from 1.
+        frame: usize,
+        /// The category.
+        found: String,
+        /// The known name that is spelled most like it.
+        nearest: String,
+    },
+    /// Action units do not become weights.
+    #[error("{name}: its action units cannot be used")]
+    ActionUnits {
+        /// Name of the take.
+        name: String,
+        /// Why.
+        #[source]
+        source: crate::facs::FacsError,
+    },
+    /// Something is asked of a take that it cannot do.
+    #[error("{name}: {problem}")]
+    Adjust {
+        /// Name of the take.
+        name: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
     /// A line of a keyed take is wrong.
     #[error("{name}:{line}: {problem}")]
     Keys {

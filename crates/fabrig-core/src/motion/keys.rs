@@ -12,7 +12,8 @@
 //! 9.0  end                                 # holds everything until here
 //! ```
 //!
-//! Channels are ARKit's shapes in any spelling (0 to 1), `head.yaw`, `head.pitch`,
+//! Channels are ARKit's shapes in any spelling and FACS action units, `AU12` or one side of it
+//! `AU12.l` (0 to 1; what units do to the shapes adds to the shapes' own), `head.yaw`, `head.pitch`,
 //! `head.roll` (degrees, signs as in [`HeadPose`]), `head.x`, `head.y`, `head.z` (mm) and
 //! `wind.x`, `wind.y`, `wind.z` (m/s, head frame axes at rest). Every channel is at 0 at time
 //! 0 unless a key says otherwise, and holds its last value. A segment is `smooth` (3s² - 2s³)
@@ -21,9 +22,11 @@
 
 use std::collections::BTreeMap;
 
+use super::read::ReadOptions;
+use super::units::UnitChannels;
 use super::{Clip, ClipTracks, HeadPose, MotionError};
 use crate::Vector;
-use crate::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
+use crate::facs::{ARKIT_SHAPES, ShapeMatch, Side, match_shape, match_unit, nearest_name};
 
 /// First word of every keyed take.
 pub(super) const MAGIC: &str = "fabrig-keys";
@@ -53,6 +56,8 @@ const FIRST_WIND: usize = 6;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Channel {
     Shape(usize),
+    /// Number of an action unit, and whether this is its right side.
+    Unit(u32, bool),
     Other(usize),
 }
 
@@ -96,6 +101,15 @@ struct Key {
 ///
 /// [`MotionError::Keys`] with the line.
 pub fn parse_keys(text: &str, name: &str) -> Result<Clip, MotionError> {
+    parse_keys_with(text, name, &ReadOptions::default())
+}
+
+/// [`parse_keys`] with the action units of the options.
+pub(super) fn parse_keys_with(
+    text: &str,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<Clip, MotionError> {
     let mut take = KeyedTake::default();
     let mut has_header = false;
     let mut last_line = 0;
@@ -117,7 +131,7 @@ pub fn parse_keys(text: &str, name: &str) -> Result<Clip, MotionError> {
             problem,
         })?;
     }
-    take.into_clip(name, last_line)
+    take.into_clip(name, last_line, options)
 }
 
 fn check_header(content: &str) -> Result<(), String> {
@@ -190,12 +204,12 @@ impl KeyedTake {
     }
 
     fn add(&mut self, channel: Channel, key: Key) -> Result<(), String> {
-        if let Channel::Shape(shape) = channel
-            && !(0.0..=1.0).contains(&key.value)
-        {
+        let is_weight = !matches!(channel, Channel::Other(_));
+        if is_weight && !(0.0..=1.0).contains(&key.value) {
             return Err(format!(
                 "{} = {}: weights lie in [0, 1]",
-                ARKIT_SHAPES[shape], key.value
+                channel_name(channel),
+                key.value
             ));
         }
         let rest = Key {
@@ -220,7 +234,12 @@ impl KeyedTake {
         Ok(())
     }
 
-    fn into_clip(self, name: &str, last_line: usize) -> Result<Clip, MotionError> {
+    fn into_clip(
+        self,
+        name: &str,
+        last_line: usize,
+        options: &ReadOptions,
+    ) -> Result<Clip, MotionError> {
         let problem = |problem: String| MotionError::Keys {
             name: name.to_owned(),
             line: last_line,
@@ -238,11 +257,18 @@ impl KeyedTake {
             )));
         }
         let times: Vec<f64> = (0..=step_count as usize).map(|i| i as f64 / rate).collect();
-        let channels = self.keys.keys().filter_map(|channel| match channel {
-            Channel::Shape(shape) => Some(ARKIT_SHAPES[*shape].to_owned()),
-            Channel::Other(_) => None,
-        });
-        let channels: Vec<String> = channels.collect();
+        let units = self.units(name, options, &problem)?;
+        let mut shapes: Vec<usize> = self
+            .keys
+            .keys()
+            .filter_map(|channel| match channel {
+                Channel::Shape(shape) => Some(*shape),
+                Channel::Unit(..) | Channel::Other(_) => None,
+            })
+            .chain(units.iter().flat_map(|(channels, _)| channels.shapes()))
+            .collect();
+        shapes.sort_unstable();
+        shapes.dedup();
         let has = |range: std::ops::Range<usize>| {
             self.keys
                 .keys()
@@ -251,17 +277,28 @@ impl KeyedTake {
         let has_head = has(0..FIRST_WIND);
         let has_wind = has(FIRST_WIND..OTHER_CHANNELS.len());
 
-        let mut weights = Vec::with_capacity(times.len() * channels.len());
+        let mut weights = Vec::with_capacity(times.len() * shapes.len());
         let mut tracks = ClipTracks::default();
         for &time in &times {
             let mut others = [0.0; OTHER_CHANNELS.len()];
+            let mut row = [0.0f32; ARKIT_SHAPES.len()];
+            if let Some((channels, bound)) = &units {
+                let mut intensities = channels.rest();
+                for (channel, unit, side) in bound {
+                    let value = value_at(&self.keys[channel], time) as f32;
+                    UnitChannels::set(&mut intensities[*unit], Some(*side), value);
+                }
+                row.copy_from_slice(&channels.weights(name, &intensities)?);
+            }
             for (channel, keys) in &self.keys {
                 let value = value_at(keys, time);
                 match channel {
-                    Channel::Shape(_) => weights.push(value as f32),
+                    Channel::Shape(shape) => row[*shape] = (row[*shape] + value as f32).min(1.0),
+                    Channel::Unit(..) => {}
                     Channel::Other(other) => others[*other] = value,
                 }
             }
+            weights.extend(shapes.iter().map(|&shape| row[shape]));
             let [yaw, pitch, roll, x, y, z, wind @ ..] = others;
             if has_head {
                 tracks.head.push(HeadPose {
@@ -275,6 +312,7 @@ impl KeyedTake {
                 tracks.wind.push(Vector::from(wind) * MM_PER_M);
             }
         }
+        let channels = shapes.iter().map(|&s| ARKIT_SHAPES[s].to_owned()).collect();
         Clip::new(times, channels, weights)
             .and_then(|clip| clip.with_tracks(tracks))
             .map_err(|source| MotionError::Clip {
@@ -284,16 +322,63 @@ impl KeyedTake {
     }
 }
 
-fn channel_name(channel: Channel) -> &'static str {
+/// The units of a take: each channel with its unit in the table and its side.
+type BoundUnits = (UnitChannels, Vec<(Channel, usize, Side)>);
+
+impl KeyedTake {
+    fn units(
+        &self,
+        name: &str,
+        options: &ReadOptions,
+        problem: &dyn Fn(String) -> MotionError,
+    ) -> Result<Option<BoundUnits>, MotionError> {
+        let keyed: Vec<Channel> = (self.keys.keys().copied())
+            .filter(|channel| matches!(channel, Channel::Unit(..)))
+            .collect();
+        if keyed.is_empty() {
+            return Ok(None);
+        }
+        let mut channels = UnitChannels::new(name, options)?;
+        let mut bound = Vec::with_capacity(keyed.len());
+        for channel in keyed {
+            let Channel::Unit(number, is_right) = channel else {
+                continue;
+            };
+            let Some(unit) = channels.unit(number) else {
+                return Err(problem(format!(
+                    "AU{number} is not in the table of action units (nearest: '{}')",
+                    channels.nearest(&format!("AU{number}"))
+                )));
+            };
+            let side = if is_right { Side::Right } else { Side::Left };
+            bound.push((channel, unit, side));
+        }
+        Ok(Some((channels, bound)))
+    }
+}
+
+fn channel_name(channel: Channel) -> String {
     match channel {
-        Channel::Shape(shape) => ARKIT_SHAPES[shape],
-        Channel::Other(other) => OTHER_CHANNELS[other],
+        Channel::Shape(shape) => ARKIT_SHAPES[shape].to_owned(),
+        Channel::Unit(number, is_right) => {
+            format!("AU{number}.{}", if is_right { 'r' } else { 'l' })
+        }
+        Channel::Other(other) => OTHER_CHANNELS[other].to_owned(),
     }
 }
 
 fn channels(name: &str) -> Result<Vec<Channel>, String> {
     if let Some(other) = OTHER_CHANNELS.iter().position(|o| *o == name) {
         return Ok(vec![Channel::Other(other)]);
+    }
+    if let Some(unit) = match_unit(name).filter(|unit| unit.suffix != "c") {
+        let sides = match unit.side {
+            Some(Side::Left) => vec![false],
+            Some(Side::Right) => vec![true],
+            None => vec![false, true],
+        };
+        let channel = |is_right| Channel::Unit(unit.number, is_right);
+        return Ok(sides.into_iter().map(channel).collect());
     }
     match match_shape(name) {
         Some(ShapeMatch::One(shape)) => Ok(vec![Channel::Shape(shape)]),
@@ -348,6 +433,27 @@ mod tests {
         let head = clip.sample(0.5).head;
         assert!((head.yaw - 45f64.to_radians()).abs() < 1e-9);
         assert!((clip.sample(1.0).wind.z + 2000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn action_units_have_sides_and_add_to_shapes() {
+        let clip = parse_keys(
+            "fabrig-keys 1\nfps 10\n0 AU12=0.5 AU6.l=1 mouthSmileLeft=0.25\n1 AU12.R=1 linear\n",
+            "x",
+        )
+        .unwrap();
+        let at = |shape: &str, time: f64| {
+            let channel = clip.channel_indices(&[shape])[0].unwrap();
+            clip.sample(time).weights[channel]
+        };
+        assert_eq!(at("mouthSmileLeft", 1.0), 0.75);
+        assert!((at("mouthSmileRight", 0.5) - 0.75).abs() < 1e-6);
+        assert_eq!(
+            (at("cheekSquintLeft", 0.0), at("cheekSquintRight", 0.0)),
+            (1.0, 0.0)
+        );
+        let error = parse_keys("fabrig-keys 1\n0 AU99=1\n", "x").unwrap_err();
+        assert!(error.to_string().contains("AU99"), "{error}");
     }
 
     #[test]

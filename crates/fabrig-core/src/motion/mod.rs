@@ -1,20 +1,29 @@
 //! Takes: weights of shapes, head and eye rotation and wind over time.
 //!
-//! [`read`] takes a file (Live Link Face or other ARKit CSV, or the keyed text format of
-//! [`parse_keys`]) to a [`Clip`]; [`Clip::sample`] gives the values between its frames.
+//! [`read`] takes a file of any kind ([`TakeFormat`]) to a [`Clip`], fitted to its performer
+//! by an [`Adjustment`]; [`Clip::sample`] gives the values between its frames, [`write_csv`]
+//! writes it down again.
 
+mod adjust;
 mod clip;
-mod csv_take;
+mod csv;
 mod error;
+mod face_cap;
+mod frames;
 mod interpolate;
 mod keys;
+mod mediapipe;
 mod pose;
 mod read;
 mod timecode;
+mod units;
+mod write;
 
-pub use clip::{Clip, ClipError, ClipNotes, ClipTracks, Sample};
-pub use csv_take::parse_csv;
+pub use adjust::Adjustment;
+pub use clip::{Clip, ClipError, ClipNotes, ClipTracks, Gap, Sample};
+pub use csv::parse_csv;
 pub use error::MotionError;
 pub use keys::parse_keys;
 pub use pose::{EyeAngles, HeadPose};
-pub use read::{ReadOptions, WEIGHT_TOLERANCE, parse, read};
+pub use read::{ReadOptions, TakeFormat, WEIGHT_TOLERANCE, parse, read};
+pub use write::write_csv;

@@ -30,6 +30,19 @@ impl Default for HeadPose {
 }
 
 impl HeadPose {
+    /// The pose without translation whose [`Self::rotation`] is this one; pitch in
+    /// [-pi/2, pi/2].
+    pub fn from_rotation(rotation: &UnitQuaternion<f64>) -> Self {
+        // R = Ry(yaw) Rx(pitch) Rz(roll), read off its third column and second row.
+        let r = rotation.to_rotation_matrix();
+        Self {
+            yaw: r[(0, 2)].atan2(r[(2, 2)]),
+            pitch: (-r[(1, 2)]).clamp(-1.0, 1.0).asin(),
+            roll: r[(1, 0)].atan2(r[(1, 1)]),
+            translation: Vector::zeros(),
+        }
+    }
+
     /// The rotation: roll first, then pitch, then yaw.
     pub fn rotation(&self) -> UnitQuaternion<f64> {
         UnitQuaternion::from_axis_angle(&Vector::y_axis(), self.yaw)
@@ -50,6 +63,20 @@ pub struct EyeAngles {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pose_is_read_back_from_its_rotation() {
+        let pose = HeadPose {
+            yaw: 0.7,
+            pitch: -0.4,
+            roll: 0.2,
+            ..HeadPose::default()
+        };
+        let back = HeadPose::from_rotation(&pose.rotation());
+        assert!((back.yaw - pose.yaw).abs() < 1e-12);
+        assert!((back.pitch - pose.pitch).abs() < 1e-12);
+        assert!((back.roll - pose.roll).abs() < 1e-12);
+    }
 
     #[test]
     fn signs_are_what_the_documentation_says() {
