@@ -177,6 +177,9 @@ pub(crate) struct SceneArgs {
     /// Point clouds per second in the recording, 0 for none
     #[arg(long, default_value_t = RecordingOptions::default().points_hz, value_parser = parse_rate)]
     pub(crate) points_hz: f64,
+    /// Patch meshes coloured by their stretch per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().strain_hz, value_parser = parse_rate)]
+    pub(crate) strain_hz: f64,
     /// Print the report as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -189,6 +192,7 @@ impl SceneArgs {
             skin_hz: self.skin_hz,
             patches_hz: self.patches_hz,
             points_hz: self.points_hz,
+            strain_hz: self.strain_hz,
             ..RecordingOptions::default()
         }
     }

@@ -71,7 +71,9 @@ fn plate<'a>(
                 color: Rgb::from_srgb(patch.chart.color),
             }]);
         }
-        picture = picture.with_layer(patch_layer(&patch.chart, shifted)?);
+        // Moved off the skin, patches would cast shadows that are not there.
+        let layer = patch_layer(&patch.chart, shifted)?.with_light_of_its_own();
+        picture = picture.with_layer(layer);
     }
     Ok(picture)
 }

@@ -57,6 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             &triangles,
         )],
         weight_names: vec!["jawOpen".to_owned(), "mouthSmileLeft".to_owned()],
+        plotted_weights: Vec::new(),
         stat_names: vec!["stretch_energy".to_owned(), "step_ms".to_owned()],
         extra: vec![("take".to_owned(), "wobble".to_owned())],
     };
@@ -83,6 +84,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             skin: &skin,
             patches: &patches,
             parts: &[&eye],
+            strains: &[],
             head: Isometry3::rotation(Vector3::y() * 0.3 * f64::from((t * TAU * 0.4).sin())),
             weights: &[
                 0.5 - 0.5 * (t * TAU).cos(),

@@ -25,6 +25,7 @@ from rerun.blueprint.encodings import VisualizerComponentMapping
 WORLD = "world"
 HEAD = "head"
 SKIN, PARTS, PATCHES = "/rig/skin", "/rig/parts", "/rig/patches"
+STRAIN = "/rig/strain"
 POINTS = ["/points/skin", "/points/patches"]
 SURFACE = ".entities[].triangles[]"
 MESH = {
@@ -33,8 +34,8 @@ MESH = {
     "Mesh3D:vertex_normals": f"{SURFACE}.mesh_normals[] | pack(.x!, .y!, .z!)",
     "Mesh3D:vertex_colors": f"{SURFACE}.mesh_colors[]",
 }
-PLOTTED = 12
-"""Lines in one plot, taken from all over the list; more cannot be told apart."""
+UNITS = {"_mm": "Distances (mm)", "_energy": "Energies", "_ms": "Times (ms)", "": "Counts"}
+"""What a plot of statistics is called, by the end of their names."""
 
 
 def mapping(target, component, selector):
@@ -68,42 +69,52 @@ def scene(name, topics):
 
 
 def plot(name, topic, component, fields):
-    """A plot of the first fields of a series message."""
+    """A plot of some fields of a series message."""
     lines = [
         rr.SeriesLines(names=field).visualizer(
             mappings=[mapping("Scalars:scalars", component, f".{field}")]
         )
-        for field in fields[:: -(-len(fields) // PLOTTED)]
+        for field in fields
     ]
     return rrb.TimeSeriesView(origin=topic, name=name, overrides={topic: lines})
 
 
-def series_fields(path):
-    """Field names of the weights and statistics, as the recorder listed them."""
+def read_summary(path):
+    """Topics with messages, and what the weights' and statistics' channels say of their fields."""
     with open(path, "rb") as file:
-        channels = make_reader(file).get_summary().channels.values()
-        listed = {c.topic: c.metadata.get("fields", "") for c in channels}
-    names = {topic: [n for n in text.split(",") if n] for topic, text in listed.items()}
-    return names.get("/weights", []), names.get("/stats", [])
+        summary = make_reader(file).get_summary()
+    channels = {c.topic: c for c in summary.channels.values()}
+    counts = summary.statistics.channel_message_counts
+    topics = {topic for topic, channel in channels.items() if counts.get(channel.id)}
+
+    def listed(topic, key):
+        channel = channels.get(topic)
+        text = channel.metadata.get(key, "") if channel else ""
+        return [name for name in text.split(",") if name]
+
+    return topics, listed("/weights", "plotted"), listed("/stats", "fields")
+
+
+def unit(name):
+    """The end of a statistic's name that tells its unit."""
+    return next(end for end in UNITS if name.endswith(end))
 
 
 def blueprint(path):
     """The whole arrangement for one recording."""
-    weights, stats = series_fields(path)
+    topics, weights, stats = read_summary(path)
     below = []
     if weights:
         below.append(plot("Weights", "/weights", "fabrig.Weights:message", weights))
-    if stats:
-        # Energies are larger than everything else by orders of magnitude.
-        energies = [name for name in stats if name.endswith("_energy")]
-        others = [name for name in stats if name not in energies]
-        for name, fields in [("Statistics", others), ("Energies", energies)]:
-            if fields:
-                below.append(plot(name, "/stats", "fabrig.Stats:message", fields))
+    for end, title in UNITS.items():
+        fields = [name for name in stats if unit(name) == end]
+        if fields:
+            below.append(plot(title, "/stats", "fabrig.Stats:message", fields))
     below.append(rrb.TextLogView(origin="/log", name="Log"))
     above = rrb.Horizontal(
         scene("Skin", [SKIN, PARTS]),
         scene("Muscles and fat", [PATCHES, PARTS]),
+        *([scene("Strain", [STRAIN, PARTS])] if STRAIN in topics else []),
         rrb.Spatial3DView(
             origin="/",
             name="Points",

@@ -148,13 +148,19 @@ fn picture(args: &RenderArgs, view: View, subject: &Subject, focus: &[Point]) ->
             layer
         }
     });
-    let mut picture = Picture::new(args.size, args.size)
+    // Names stand beside what they name.
+    let width = if subject.labels.is_empty() {
+        args.size
+    } else {
+        args.size * 8 / 5
+    };
+    let mut picture = Picture::new(width, args.size)
         .with_view(view)
         .with_focus(focus.iter().copied())
         .with_layers(layers);
     if !subject.labels.is_empty() {
         picture = picture
-            .with_margins(0.25, 0.04)
+            .with_margins(0.05, 0.04)
             .with_labels(subject.labels.iter().cloned());
     }
     Ok(picture.render()?)

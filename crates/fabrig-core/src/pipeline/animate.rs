@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::TimeStatistics;
+use super::strain::fibre_strain;
 use crate::Error;
 use crate::Vector;
 use crate::cloth::Counters;
@@ -93,6 +94,8 @@ pub struct AnimateReport {
 const STANDARD_RATES: [f64; 7] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0];
 const RATE_TOLERANCE: f64 = 0.005;
 const DEFAULT_RATE: f64 = 60.0;
+/// Weights that a recording's plots show at first.
+const PLOTTED_WEIGHTS: usize = 12;
 
 /// The rate at which a take is simulated unless another is asked for: its own.
 pub fn recording_rate(clip: &Clip) -> f64 {
@@ -123,8 +126,9 @@ pub fn animate(
     let wall = Instant::now();
     let fps = options.fps.unwrap_or_else(|| recording_rate(&clip));
     let surfaces = Surfaces::new(&rig);
-    let info = recording_info(&rig, &surfaces, fps, scene.cloth.seed, options);
-    let foxglove_layout = foxglove_layout(&info);
+    let mut info = recording_info(&rig, &surfaces, fps, scene.cloth.seed, options);
+    info.plotted_weights = most_moved(&clip, &info.weight_names);
+    let foxglove_layout = foxglove_layout(&info, &options.recording);
     // Opened first: it refuses a bad frame rate or folder before anything is computed.
     let mut recorder = McapRecorder::create(output, info, options.recording)?;
     let take = clip.notes().clone();
@@ -134,7 +138,8 @@ pub fn animate(
     let run = Simulation::new(rig, scene, Some(clip))
         .map_err(Error::from)
         .and_then(|simulation| {
-            let run = Run::new(simulation, &surfaces, fps, frame_count);
+            let mut run = Run::new(simulation, &surfaces, fps, frame_count);
+            run.has_strain = options.recording.strain_hz > 0.0;
             run.record_all(&mut recorder, progress)
         });
     let measures = match run {
@@ -182,6 +187,8 @@ struct Run<'a> {
     measures: Measures,
     /// Vertices of each part, gathered anew every frame.
     parts: Vec<Vec<Point3<f32>>>,
+    /// Whether the stretch of the patches is recorded.
+    has_strain: bool,
 }
 
 impl<'a> Run<'a> {
@@ -193,6 +200,7 @@ impl<'a> Run<'a> {
             frame_count,
             measures: Measures::default(),
             parts: vec![Vec::new(); surfaces.part_vertices.len()],
+            has_strain: false,
         }
     }
 
@@ -234,7 +242,14 @@ impl<'a> Run<'a> {
         let patches: Vec<&[Point3<f32>]> = (0..self.surfaces.patches.len())
             .map(|patch| simulation.patch_positions(patch))
             .collect();
+        let mut strains = Vec::new();
+        if self.has_strain {
+            let rig = simulation.rig().patches.iter().zip(&patches);
+            strains.extend(rig.map(|(patch, nodes)| fibre_strain(&patch.patch, nodes)));
+        }
+        let strains: Vec<&[f32]> = strains.iter().map(Vec::as_slice).collect();
         recorder.record(&Frame {
+            strains: &strains,
             skin,
             patches: &patches,
             parts: &parts,
@@ -338,7 +353,7 @@ impl Surfaces {
                 .map(|p| {
                     let chart = &p.patch.chart;
                     let [r, g, b] = chart.color;
-                    let quads = chart.grid.quads();
+                    let quads = chart.quads();
                     SurfaceInfo {
                         name: chart.name.clone(),
                         color: [r, g, b, PATCH_OPACITY],
@@ -416,9 +431,34 @@ fn recording_info(
         patches: surfaces.patches.clone(),
         parts: surfaces.parts.clone(),
         weight_names: rig.shape_names.clone(),
+        plotted_weights: Vec::new(),
         stat_names: STAT_NAMES.map(str::to_owned).to_vec(),
         extra: vec![("take".to_owned(), options.take_name.clone())],
     }
+}
+
+/// The weights that a take moves most, in the order of `names`.
+fn most_moved(clip: &Clip, names: &[String]) -> Vec<String> {
+    let channel_count = clip.channels().len();
+    let span = |channel: usize| {
+        let values = clip.weights().iter().skip(channel).step_by(channel_count);
+        let (low, high) = values.fold((1.0f32, 0.0f32), |(low, high), &w| {
+            (low.min(w), high.max(w))
+        });
+        high - low
+    };
+    let listed: Vec<&str> = names.iter().map(String::as_str).collect();
+    let channels = clip.channel_indices(&listed);
+    let mut moved: Vec<(usize, f32)> = channels
+        .iter()
+        .enumerate()
+        .filter_map(|(name, &channel)| Some((name, span(channel?))))
+        .filter(|&(_, span)| span > 0.0)
+        .collect();
+    moved.sort_by(|a, b| b.1.total_cmp(&a.1));
+    moved.truncate(PLOTTED_WEIGHTS);
+    moved.sort_unstable_by_key(|&(name, _)| name);
+    moved.iter().map(|&(name, _)| names[name].clone()).collect()
 }
 
 fn milliseconds(clock: Instant) -> f64 {

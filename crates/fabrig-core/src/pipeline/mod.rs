@@ -22,6 +22,7 @@
 mod animate;
 mod cost;
 mod rig_face;
+mod strain;
 mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};

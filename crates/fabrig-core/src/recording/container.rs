@@ -1,4 +1,4 @@
-//! The container: MCAP records, chunks of messages, and the summary that readers seek by.
+//! The container: MCAP records, compressed chunks, and the summary that readers seek by.
 //!
 //! The `mcap` crate's own writer gives no say over zstd beyond its level. A recorded mesh
 //! repeats its topology after megabytes, farther than a fast level looks back; with long
@@ -11,6 +11,8 @@ use std::io::{self, Write};
 
 use zstd::bulk::Compressor;
 use zstd::zstd_safe::CParameter;
+
+use super::chunk::{Chunk, widen};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const COMPRESSION: &str = "zstd";
@@ -28,7 +30,6 @@ mod opcode {
     pub(super) const FOOTER: u8 = 0x02;
     pub(super) const SCHEMA: u8 = 0x03;
     pub(super) const CHANNEL: u8 = 0x04;
-    pub(super) const MESSAGE: u8 = 0x05;
     pub(super) const CHUNK: u8 = 0x06;
     pub(super) const MESSAGE_INDEX: u8 = 0x07;
     pub(super) const CHUNK_INDEX: u8 = 0x08;
@@ -79,16 +80,6 @@ impl Content {
     }
 }
 
-/// Messages of the chunk being filled.
-#[derive(Default)]
-struct Chunk {
-    records: Vec<u8>,
-    /// First and last log time. (ns)
-    times: Option<(u64, u64)>,
-    /// Log time and offset of every message, by channel.
-    index: BTreeMap<u16, Vec<(u64, u64)>>,
-}
-
 /// What is counted for the statistics record.
 #[derive(Default)]
 struct Counts {
@@ -105,9 +96,6 @@ pub(super) struct ContainerWriter<W> {
     position: u64,
     data_crc: crc32fast::Hasher,
     compressor: Compressor<'static>,
-    chunk: Chunk,
-    /// Size at which a chunk is closed. (bytes before compression)
-    chunk_bytes: usize,
     schemas: Vec<Content>,
     channels: Vec<Content>,
     chunk_indexes: Vec<Content>,
@@ -119,14 +107,8 @@ pub(super) struct ContainerWriter<W> {
 impl<W: Write> ContainerWriter<W> {
     /// Begins a file.
     ///
-    /// - `chunk_bytes`: size at which a chunk is closed, before compression
     /// - `period_bytes`: after how many bytes messages resemble earlier ones
-    pub(super) fn new(
-        out: W,
-        library: &str,
-        chunk_bytes: u64,
-        period_bytes: usize,
-    ) -> io::Result<Self> {
+    pub(super) fn new(out: W, library: &str, period_bytes: usize) -> io::Result<Self> {
         let mut compressor = Compressor::new(COMPRESSION_LEVEL)?;
         compressor.long_distance_matching(true)?;
         compressor.set_parameter(CParameter::LdmMinMatch(DISTANT_MATCH))?;
@@ -139,9 +121,6 @@ impl<W: Write> ContainerWriter<W> {
             position: 0,
             data_crc: crc32fast::Hasher::new(),
             compressor,
-            chunk: Chunk::default(),
-            // A chunk is kept in memory, and its sizes must fit the decoders of browsers.
-            chunk_bytes: chunk_bytes.min(1 << 30) as usize,
             schemas: Vec::new(),
             channels: Vec::new(),
             chunk_indexes: Vec::new(),
@@ -213,56 +192,27 @@ impl<W: Write> ContainerWriter<W> {
         Ok(())
     }
 
-    /// Adds a message to the chunk, and closes the chunk if it is full.
-    pub(super) fn message(
-        &mut self,
-        channel: u16,
-        sequence: u32,
-        log_time: u64,
-        data: &[u8],
-    ) -> io::Result<()> {
-        let offset = self.chunk.records.len() as u64;
-        let header = Content::default().u16(channel).u32(sequence);
-        let header = header.u64(log_time).u64(log_time).0;
-        let records = &mut self.chunk.records;
-        records.push(opcode::MESSAGE);
-        records.extend_from_slice(&((header.len() + data.len()) as u64).to_le_bytes());
-        records.extend_from_slice(&header);
-        records.extend_from_slice(data);
-        let index = self.chunk.index.entry(channel).or_default();
-        index.push((log_time, offset));
-        widen(&mut self.chunk.times, log_time);
-        widen(&mut self.counts.times, log_time);
-        *self.counts.by_channel.entry(channel).or_default() += 1;
-        if self.chunk.records.len() >= self.chunk_bytes {
-            self.close_chunk()?;
-        }
-        Ok(())
-    }
-
-    /// Compresses what waits and hands everything to the system.
-    pub(super) fn flush(&mut self) -> io::Result<()> {
-        self.close_chunk()?;
-        self.out.flush()
-    }
-
-    fn close_chunk(&mut self) -> io::Result<()> {
-        let Some((first, last)) = self.chunk.times.take() else {
+    /// Compresses and writes a chunk with its indexes; nothing for one without messages.
+    pub(super) fn write_chunk(&mut self, messages: &Chunk) -> io::Result<()> {
+        let Some((first, last)) = messages.times() else {
             return Ok(());
         };
-        let compressed = self.compressor.compress(&self.chunk.records)?;
-        let uncompressed_size = self.chunk.records.len() as u64;
+        widen(&mut self.counts.times, first);
+        widen(&mut self.counts.times, last);
+        let records = messages.records();
+        let compressed = self.compressor.compress(records)?;
+        let uncompressed_size = records.len() as u64;
         let mut chunk = Content::default().u64(first).u64(last);
         chunk = chunk.u64(uncompressed_size);
-        chunk = chunk.u32(crc32fast::hash(&self.chunk.records));
+        chunk = chunk.u32(crc32fast::hash(records));
         chunk = chunk.text(COMPRESSION).u64(compressed.len() as u64);
         chunk.0.extend_from_slice(&compressed);
         let (offset, length) = self.record(opcode::CHUNK, &chunk)?;
-        self.chunk.records.clear();
 
         let index_start = self.position;
         let mut index_offsets = Content::default();
-        for (channel, messages) in std::mem::take(&mut self.chunk.index) {
+        for (&channel, messages) in messages.index() {
+            *self.counts.by_channel.entry(channel).or_default() += messages.len() as u64;
             index_offsets = index_offsets.u16(channel).u64(self.position);
             let entries = messages
                 .iter()
@@ -280,9 +230,13 @@ impl<W: Write> ContainerWriter<W> {
         Ok(())
     }
 
+    /// Hands everything to the system.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     /// Closes the file and gives back what it was written to.
-    pub(super) fn finish(&mut self) -> io::Result<()> {
-        self.close_chunk()?;
+    pub(super) fn finish(mut self) -> io::Result<W> {
         let crc = self.data_crc.clone().finalize();
         self.record(opcode::DATA_END, &Content::default().u32(crc))?;
 
@@ -324,12 +278,8 @@ impl<W: Write> ContainerWriter<W> {
         summary[crc_at..].copy_from_slice(&crc.to_le_bytes());
         self.write(&summary)?;
         self.write(&MAGIC)?;
-        self.out.flush()
-    }
-
-    /// What the file is written to.
-    pub(super) fn get_ref(&self) -> &W {
-        &self.out
+        self.out.flush()?;
+        Ok(self.out)
     }
 
     fn statistics(&self) -> Content {
@@ -373,20 +323,13 @@ fn append_record(bytes: &mut Vec<u8>, opcode: u8, content: &Content) {
     bytes.extend_from_slice(&content.0);
 }
 
-fn widen(times: &mut Option<(u64, u64)>, time: u64) {
-    let (first, last) = times.unwrap_or((time, time));
-    *times = Some((first.min(time), last.max(time)));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// A file with two topics whose messages repeat after `size` bytes.
     fn written(size: usize, rounds: u64, period_bytes: usize) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut writer =
-            ContainerWriter::new(&mut bytes, "test", 16 << 20, period_bytes).expect("begun");
+        let mut writer = ContainerWriter::new(Vec::new(), "test", period_bytes).expect("begun");
         let table = BTreeMap::from([("a".to_owned(), "b".to_owned())]);
         writer.add_metadata("about", &table).expect("metadata");
         writer
@@ -405,17 +348,14 @@ mod tests {
         })
         .take(size)
         .collect();
+        let mut chunk = Chunk::default();
         for k in 0..rounds {
             noise[0] = k as u8;
-            writer
-                .message(one, k as u32, k * 10, &noise)
-                .expect("message");
-            writer
-                .message(two, k as u32, k * 10, &[k as u8])
-                .expect("message");
+            chunk.add(one, k as u32, k * 10, &noise);
+            chunk.add(two, k as u32, k * 10, &[k as u8]);
         }
-        writer.finish().expect("finished");
-        bytes
+        writer.write_chunk(&chunk).expect("chunk");
+        writer.finish().expect("finished")
     }
 
     #[test]

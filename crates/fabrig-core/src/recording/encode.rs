@@ -34,9 +34,18 @@ pub(super) struct SurfaceEncoder {
 
 impl SurfaceEncoder {
     pub(super) fn new(surfaces: &[SurfaceInfo]) -> Self {
+        Self::encoded(surfaces, EncodedSurface::new)
+    }
+
+    /// For [`Self::colored_scene`].
+    pub(super) fn colored_later(surfaces: &[SurfaceInfo]) -> Self {
+        Self::encoded(surfaces, EncodedSurface::colored_later)
+    }
+
+    fn encoded(surfaces: &[SurfaceInfo], encode: fn(&SurfaceInfo, u32) -> EncodedSurface) -> Self {
         let mut first = 0;
         let surfaces = surfaces.iter().map(|surface| {
-            let encoded = EncodedSurface::new(surface, first);
+            let encoded = encode(surface, first);
             first += surface.vertex_count as u32;
             encoded
         });
@@ -64,6 +73,27 @@ impl SurfaceEncoder {
         let mut scene = Vec::with_capacity(self.scene_bytes() + 256 * (1 + self.surfaces.len()));
         for (surface, positions) in self.surfaces.iter().zip(positions) {
             surface.append_to(&mut scene, nanos, positions);
+        }
+        scene
+    }
+
+    /// As [`Self::scene`], each vertex in a colour of its own.
+    pub(super) fn colored_scene(
+        &self,
+        nanos: u64,
+        positions: &[&[Point3<f32>]],
+        colors: &[Vec<[u8; 4]>],
+    ) -> Vec<u8> {
+        let mut scene = Vec::new();
+        let surfaces = self.surfaces.iter().zip(positions).zip(colors);
+        for ((surface, positions), colors) in surfaces {
+            // Messages of one type may be encoded in parts: a parser joins them.
+            let colors = wire::TriangleList {
+                colors: colors.iter().map(color).collect(),
+                mesh_colors: colors.iter().map(|&c| u32::from_be_bytes(c)).collect(),
+                ..wire::TriangleList::default()
+            };
+            surface.append_with(&mut scene, nanos, positions, &colors.encode_to_vec());
         }
         scene
     }
@@ -116,11 +146,26 @@ const NORMAL_BYTES: usize = 18;
 impl EncodedSurface {
     /// `first` counts the vertices of the message before this surface.
     fn new(info: &SurfaceInfo, first: u32) -> Self {
+        Self::with_colors(info, first, &info.vertex_colors, true)
+    }
+
+    /// A surface whose vertices get their colours with every frame.
+    fn colored_later(info: &SurfaceInfo, first: u32) -> Self {
+        Self::with_colors(info, first, &[], false)
+    }
+
+    fn with_colors(
+        info: &SurfaceInfo,
+        first: u32,
+        vertex_colors: &[[u8; 4]],
+        has_colors: bool,
+    ) -> Self {
+        let colored = if has_colors { info.vertex_count } else { 0 };
         let list = wire::TriangleList {
             pose: Some(identity_pose()),
             points: Vec::new(),
             color: Some(color(&info.color)),
-            colors: info.vertex_colors.iter().map(color).collect(),
+            colors: vertex_colors.iter().map(color).collect(),
             indices: info.triangles.iter().flatten().copied().collect(),
             mesh_triangles: info
                 .triangles
@@ -132,8 +177,8 @@ impl EncodedSurface {
                 })
                 .collect(),
             mesh_normals: Vec::new(),
-            mesh_colors: (0..info.vertex_count)
-                .map(|v| info.vertex_colors.get(v).unwrap_or(&info.color))
+            mesh_colors: (0..colored)
+                .map(|v| vertex_colors.get(v).unwrap_or(&info.color))
                 .map(|color| u32::from_be_bytes(*color))
                 .collect(),
         };
@@ -155,7 +200,13 @@ impl EncodedSurface {
     /// Adds the surface to a scene update. Protobuf takes fields in any order, and zeros may
     /// be written out: every frame has its bytes in the same places, which compresses better.
     fn append_to(&self, scene: &mut Vec<u8>, nanos: u64, positions: &[Point3<f32>]) {
-        let list_bytes = self.list.len() + positions.len() * (POINT_BYTES + NORMAL_BYTES);
+        self.append_with(scene, nanos, positions, &[]);
+    }
+
+    /// As [`Self::append_to`], with more encoded fields of the triangle list.
+    fn append_with(&self, scene: &mut Vec<u8>, nanos: u64, positions: &[Point3<f32>], more: &[u8]) {
+        let points_bytes = positions.len() * (POINT_BYTES + NORMAL_BYTES);
+        let list_bytes = self.list.len() + more.len() + points_bytes;
         let time = timestamp(nanos).encode_to_vec();
         let entity_bytes = field_bytes(wire::tag::ENTITY_TIMESTAMP, time.len())
             + self.entity.len()
@@ -166,6 +217,7 @@ impl EncodedSurface {
         scene.extend_from_slice(&self.entity);
         begin_field(scene, wire::tag::ENTITY_TRIANGLES, list_bytes);
         scene.extend_from_slice(&self.list);
+        scene.extend_from_slice(more);
         for p in positions {
             let start = scene.len();
             begin_field(scene, wire::tag::LIST_POINTS, 27);

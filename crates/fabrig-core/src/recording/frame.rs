@@ -21,6 +21,8 @@ pub mod topics {
     pub const SKIN: &str = "/rig/skin";
     /// The patches of muscle and fat as shaded meshes.
     pub const PATCHES: &str = "/rig/patches";
+    /// The patches again, coloured by their stretch; only where it is asked for.
+    pub const STRAIN: &str = "/rig/strain";
     /// Eyeballs, teeth and tongue as shaded meshes.
     pub const PARTS: &str = "/rig/parts";
     /// Skin vertices as points; shows in Rerun with no setup.
@@ -69,6 +71,8 @@ pub struct RecordingInfo {
     pub parts: Vec<SurfaceInfo>,
     /// Names of the weights, in the order of [`Frame::weights`].
     pub weight_names: Vec<String>,
+    /// Weights that plots show at first, by name; some from all over the list where empty.
+    pub plotted_weights: Vec<String>,
     /// Names of the statistics with their unit (`step_ms`), in the order of [`Frame::stats`].
     pub stat_names: Vec<String>,
     /// More for the metadata record, such as the take's name and the settings.
@@ -86,6 +90,8 @@ pub struct RecordingOptions {
     pub patches_hz: f64,
     /// Rate of both point clouds, 0 for none. (1/s)
     pub points_hz: f64,
+    /// Rate of the patches coloured by [`Frame::strains`], 0 for none. (1/s)
+    pub strain_hz: f64,
     /// Size at which a chunk is closed; what does not change from frame to frame is stored
     /// once a chunk. (bytes before compression)
     pub chunk_bytes: u64,
@@ -99,6 +105,7 @@ impl Default for RecordingOptions {
             skin_hz: 30.0,
             patches_hz: 30.0,
             points_hz: 10.0,
+            strain_hz: 0.0,
             chunk_bytes: 64 << 20,
             flush_secs: 0.5,
         }
@@ -134,6 +141,9 @@ pub struct Frame<'a> {
     pub patches: &'a [&'a [Point3<f32>]],
     /// Vertices of every part in the head frame. (mm)
     pub parts: &'a [&'a [Point3<f32>]],
+    /// Stretch of every node of every patch: 0 at rest, 0.1 for a tenth longer. Only read where
+    /// [`RecordingOptions::strain_hz`] asks for it; may be empty otherwise.
+    pub strains: &'a [&'a [f32]],
     /// Where the head is: head frame to a fixed frame with +Y up. (mm)
     pub head: Isometry3<f64>,
     /// One per [`RecordingInfo::weight_names`].
@@ -202,6 +212,10 @@ impl RecordingInfo {
             if let Some(pair) = names.windows(2).find(|w| w[0] == w[1]) {
                 return refuse(format!("two {what} are called `{}`", pair[0]));
             }
+        }
+        let is_unknown = |name: &&String| !self.weight_names.contains(name);
+        if let Some(name) = self.plotted_weights.iter().find(is_unknown) {
+            return refuse(format!("`{name}` is to be plotted, but is no weight"));
         }
         for (what, names) in [("weight", &self.weight_names), ("stat", &self.stat_names)] {
             let mut fields: Vec<String> = names.iter().map(|n| field_name(n)).collect();

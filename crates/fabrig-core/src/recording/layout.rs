@@ -3,11 +3,13 @@
 //! Foxglove and Lichtblick hide scene topics until a layout turns them on. Rerun shows the
 //! points at once and needs a blueprint for the shaded meshes and the plots; a blueprint is
 //! bound to the name of a recording, so a small Python script makes and sends it.
+//!
+//! Source of the panels' settings: the types `PlotConfig` and `RendererConfig` of Lichtblick.
 
 use serde_json::{Map, Value, json};
 
-use super::RecordingInfo;
 use super::frame::{field_name, topics};
+use super::{RecordingInfo, RecordingOptions};
 
 /// Lines in one plot; more cannot be told apart, and the viewer's legend turns them on.
 const PLOTTED: usize = 12;
@@ -16,51 +18,116 @@ const PLOTTED: usize = 12;
 /// `rerun-sdk` and `mcap`, and says how to use it with `--help`.
 pub const RERUN_SCRIPT: &str = include_str!("../../viewers/open_in_rerun.py");
 
-/// The Foxglove layout of a recording as JSON: skin and patches side by side, plots of the
-/// weights and statistics, the log.
-pub fn foxglove_layout(info: &RecordingInfo) -> String {
-    let skin = [topics::SKIN, topics::PARTS];
-    let patches = [topics::PATCHES, topics::PARTS];
+/// Units of the statistics by the end of their names, and what a plot of them is called.
+const UNITS: [(&str, &str); 3] = [
+    ("_mm", "Distances (mm)"),
+    ("_energy", "Energies"),
+    ("_ms", "Times (ms)"),
+];
+/// What a plot of all other statistics is called.
+const COUNTS: &str = "Counts";
+
+/// The Foxglove layout of a recording as JSON: skin and patches side by side (and the strain
+/// where it is recorded), a plot of the weights, one of the statistics of each unit, the log.
+pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> String {
+    let mut panels = Map::new();
+    let mut add = |id: String, panel: Value| {
+        panels.insert(id.clone(), panel);
+        Value::from(id)
+    };
+    let mut scenes = vec![
+        ("skin", "Skin", topics::SKIN),
+        ("patches", "Muscles and fat", topics::PATCHES),
+    ];
+    if options.strain_hz > 0.0 {
+        scenes.push(("strain", "Strain", topics::STRAIN));
+    }
+    let scenes = scenes.into_iter().map(|(id, title, topic)| {
+        let panel = scene_panel(title, &[topic, topics::PARTS]);
+        add(format!("3D!{id}"), panel)
+    });
+    let scenes: Vec<Value> = scenes.collect();
+
+    let weights = plot_panel(
+        "Weights",
+        topics::WEIGHTS,
+        &info.weight_names,
+        &plotted_weights(info),
+        "left",
+    );
+    let weights = add("Plot!weights".to_owned(), weights);
+    let units = UNITS.iter().map(|unit| unit.1).chain([COUNTS]);
+    let mut below = Vec::new();
+    for (index, title) in units.enumerate() {
+        let is_in = |name: &&String| stat_title(name) == title;
+        let names: Vec<String> = info.stat_names.iter().filter(is_in).cloned().collect();
+        if !names.is_empty() {
+            let panel = plot_panel(title, topics::STATS, &names, &names, "floating");
+            below.push(add(format!("Plot!stats{index}"), panel));
+        }
+    }
+    let log = json!({ "searchTerms": [], "minLogLevel": 1, "topicToRender": topics::LOG });
+    below.push(add("RosOut!log".to_owned(), log));
+    let half = below.len().div_ceil(2);
+    let second = below.split_off(half);
+    let mut columns = vec![split("row", below)];
+    if !second.is_empty() {
+        columns.push(split("row", second));
+    }
+    let lower = json!({
+        "direction": "row",
+        "splitPercentage": 42,
+        "first": weights,
+        "second": split("column", columns),
+    });
     let layout = json!({
-        "configById": {
-            "3D!skin": scene_panel("Skin", &skin),
-            "3D!patches": scene_panel("Muscles and fat", &patches),
-            "Plot!weights": plot_panel("Weights", topics::WEIGHTS, &info.weight_names),
-            "Plot!stats": plot_panel("Statistics", topics::STATS, &info.stat_names),
-            "RosOut!log": { "searchTerms": [], "minLogLevel": 1, "topicToRender": topics::LOG },
-        },
+        "configById": panels,
         "globalVariables": {},
         "userNodes": {},
         "playbackConfig": { "speed": 1 },
         "layout": {
             "direction": "column",
-            "splitPercentage": 66,
-            "first": {
-                "direction": "row",
-                "splitPercentage": 50,
-                "first": "3D!skin",
-                "second": "3D!patches",
-            },
-            "second": {
-                "direction": "row",
-                "splitPercentage": 40,
-                "first": "Plot!weights",
-                "second": {
-                    "direction": "row",
-                    "splitPercentage": 60,
-                    "first": "Plot!stats",
-                    "second": "RosOut!log",
-                },
-            },
+            "splitPercentage": 60,
+            "first": split("row", scenes),
+            "second": lower,
         },
     });
     format!("{layout:#}\n")
+}
+
+/// The weights that plots show at first.
+pub(super) fn plotted_weights(info: &RecordingInfo) -> Vec<String> {
+    if info.plotted_weights.is_empty() {
+        let step = info.weight_names.len().div_ceil(PLOTTED).max(1);
+        return info.weight_names.iter().step_by(step).cloned().collect();
+    }
+    info.plotted_weights.iter().take(PLOTTED).cloned().collect()
+}
+
+/// The plot that a statistic belongs into: lines of one plot have one unit.
+fn stat_title(name: &str) -> &'static str {
+    let known = UNITS.iter().find(|(end, _)| name.ends_with(end));
+    known.map_or(COUNTS, |(_, title)| title)
+}
+
+/// Panels side by side (`row`) or one above the other (`column`), of equal size.
+fn split(direction: &str, mut panels: Vec<Value>) -> Value {
+    let Some(last) = panels.pop() else {
+        return Value::Null;
+    };
+    let count = panels.len() + 1;
+    let panels = panels.into_iter().enumerate().rev();
+    panels.fold(last, |second, (k, first)| {
+        let share = 100.0 / (count - k) as f64;
+        json!({ "direction": direction, "splitPercentage": share, "first": first, "second": second })
+    })
 }
 
 fn scene_panel(title: &str, visible: &[&str]) -> Value {
     let all = [
         topics::SKIN,
         topics::PATCHES,
+        topics::STRAIN,
         topics::PARTS,
         topics::SKIN_POINTS,
         topics::PATCH_POINTS,
@@ -102,15 +169,20 @@ fn scene_panel(title: &str, visible: &[&str]) -> Value {
     })
 }
 
-fn plot_panel(title: &str, topic: &str, names: &[String]) -> Value {
+fn plot_panel(
+    title: &str,
+    topic: &str,
+    names: &[String],
+    enabled: &[String],
+    legend: &str,
+) -> Value {
     let paths: Vec<Value> = names
         .iter()
-        .enumerate()
-        .map(|(i, name)| {
+        .map(|name| {
             json!({
                 "value": format!("{topic}.{}", field_name(name)),
                 "label": name,
-                "enabled": i < PLOTTED,
+                "enabled": enabled.contains(name),
                 "timestampMethod": "receiveTime",
             })
         })
@@ -121,11 +193,106 @@ fn plot_panel(title: &str, topic: &str, names: &[String]) -> Value {
         "paths": paths,
         "isSynced": true,
         "showLegend": true,
-        "legendDisplay": "left",
+        "legendDisplay": legend,
         "showXAxisLabels": true,
         "showYAxisLabels": true,
         "showPlotValuesInLegend": true,
         "xAxisVal": "timestamp",
         "sidebarDimension": 160,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::SurfaceInfo;
+
+    fn info() -> RecordingInfo {
+        let words = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        RecordingInfo {
+            rig: "ball".to_owned(),
+            template: "none".to_owned(),
+            fps: 60.0,
+            seed: 0,
+            skin: SurfaceInfo {
+                name: "skin".to_owned(),
+                color: [0; 4],
+                vertex_count: 0,
+                triangles: Vec::new(),
+                vertex_colors: Vec::new(),
+            },
+            patches: Vec::new(),
+            parts: Vec::new(),
+            weight_names: (0..52).map(|k| format!("shape{k}")).collect(),
+            plotted_weights: words(&["shape7", "shape40"]),
+            stat_names: words(&["settle_mm", "bend_energy", "stretch_energy", "guards"]),
+            extra: Vec::new(),
+        }
+    }
+
+    fn layout(info: &RecordingInfo, strain_hz: f64) -> Value {
+        let options = RecordingOptions {
+            strain_hz,
+            ..RecordingOptions::default()
+        };
+        serde_json::from_str(&foxglove_layout(info, &options)).expect("JSON")
+    }
+
+    /// Panels at the ends of the tree.
+    fn leaves(node: &Value, found: &mut Vec<String>) {
+        if let Some(id) = node.as_str() {
+            return found.push(id.to_owned());
+        }
+        assert!(["row", "column"].contains(&node["direction"].as_str().expect("split")));
+        let share = node["splitPercentage"].as_f64().expect("share");
+        assert!(share > 5.0 && share < 95.0);
+        leaves(&node["first"], found);
+        leaves(&node["second"], found);
+    }
+
+    #[test]
+    fn every_panel_stands_in_the_tree_once() {
+        for strain_hz in [0.0, 15.0] {
+            let layout = layout(&info(), strain_hz);
+            let mut shown = Vec::new();
+            leaves(&layout["layout"], &mut shown);
+            shown.sort();
+            let panels = layout["configById"].as_object().expect("panels");
+            assert!(panels.keys().eq(&shown), "{shown:?}");
+            assert_eq!(shown.contains(&"3D!strain".to_owned()), strain_hz > 0.0);
+        }
+    }
+
+    #[test]
+    fn a_plot_has_one_unit_and_the_weights_that_move() {
+        let layout = layout(&info(), 0.0);
+        let lines = |panel: &str, only_enabled: bool| -> Vec<String> {
+            let paths = layout["configById"][panel]["paths"].as_array();
+            let paths = paths.expect("a plot").iter();
+            let shown = paths.filter(|p| !only_enabled || p["enabled"] == true);
+            shown
+                .filter_map(|p| p["value"].as_str().map(str::to_owned))
+                .collect()
+        };
+        assert_eq!(lines("Plot!stats0", true), ["/stats.settle_mm"]);
+        let energies = ["/stats.bend_energy", "/stats.stretch_energy"];
+        assert_eq!(lines("Plot!stats1", true), energies);
+        assert_eq!(lines("Plot!stats3", true), ["/stats.guards"]);
+        assert_eq!(
+            lines("Plot!weights", true),
+            ["/weights.shape7", "/weights.shape40"]
+        );
+        assert_eq!(lines("Plot!weights", false).len(), 52);
+    }
+
+    #[test]
+    fn without_a_choice_weights_come_from_all_over_the_list() {
+        let info = RecordingInfo {
+            plotted_weights: Vec::new(),
+            ..info()
+        };
+        let plotted = plotted_weights(&info);
+        assert!(plotted.len() > PLOTTED / 2 && plotted.len() <= PLOTTED);
+        assert_eq!(plotted[1], "shape5");
+    }
 }

@@ -8,11 +8,14 @@ use std::path::{Path, PathBuf};
 use nalgebra::Point3;
 use prost::Message;
 
+use super::background::BackgroundWriter;
 use super::container::ContainerWriter;
 use super::encode::{SurfaceEncoder, series, transforms};
 use super::frame::{POSITION_STEP, UNITS_PER_MM, field_name, stride, topics};
+use super::layout::plotted_weights;
 use super::messages::{Log, timestamp};
 use super::schema::{foxglove_descriptors, series_descriptors};
+use super::strain::{FULL_SCALE, strain_color};
 use super::{
     Frame, LogEvent, LogLevel, RecordingError, RecordingInfo, RecordingOptions, RecordingReport,
     SurfaceInfo, TopicReport, foxglove_layout,
@@ -32,14 +35,18 @@ struct Channel {
 /// at `path` is always whole. Dropping a recorder that was not finished closes the partial file
 /// properly and leaves it there if it has frames; a killed process leaves a partial file of
 /// which all flushed chunks can be read with [`super::RecordingReader::with_recovery`].
+///
+/// A thread of the recorder compresses and writes. What it fails at is returned by the next
+/// call that hands it something, at the latest by [`Self::finish`].
 pub struct McapRecorder {
-    writer: Option<ContainerWriter<BufWriter<File>>>,
+    writer: Option<BackgroundWriter<BufWriter<File>>>,
     path: PathBuf,
     partial_path: PathBuf,
     info: RecordingInfo,
     options: RecordingOptions,
     skin: SurfaceEncoder,
     patches: SurfaceEncoder,
+    strained: SurfaceEncoder,
     parts: SurfaceEncoder,
     channels: Vec<Channel>,
     frames: u64,
@@ -68,20 +75,13 @@ impl McapRecorder {
         })?;
         let skin = SurfaceEncoder::new(std::slice::from_ref(&info.skin));
         let patches = SurfaceEncoder::new(&info.patches);
+        let strained = SurfaceEncoder::colored_later(&info.patches);
         let parts = SurfaceEncoder::new(&info.parts);
-        let writer = ContainerWriter::new(
-            BufWriter::with_capacity(1 << 20, file),
-            concat!("fabrig/", env!("CARGO_PKG_VERSION")),
-            options.chunk_bytes,
-            [&skin, &patches, &parts]
-                .map(SurfaceEncoder::frame_bytes)
-                .iter()
-                .sum(),
-        );
         let mut recorder = Self {
             writer: None,
             skin,
             patches,
+            strained,
             parts,
             path,
             partial_path,
@@ -91,16 +91,23 @@ impl McapRecorder {
             frames: 0,
             last_flush_nanos: 0,
         };
-        recorder.writer = Some(writer.map_err(|e| recorder.io_error("write", e))?);
-        recorder.open_topics()?;
+        let opened = recorder.open_topics(BufWriter::with_capacity(1 << 20, file));
+        recorder.writer = Some(opened.map_err(|e| recorder.io_error("write", e))?);
         Ok(recorder)
     }
 
-    fn open_topics(&mut self) -> Result<(), RecordingError> {
+    fn open_topics(
+        &mut self,
+        file: BufWriter<File>,
+    ) -> io::Result<BackgroundWriter<BufWriter<File>>> {
+        let encoders = [&self.skin, &self.patches, &self.parts];
+        let period_bytes = encoders.map(SurfaceEncoder::frame_bytes).iter().sum();
+        let library = concat!("fabrig/", env!("CARGO_PKG_VERSION"));
+        let mut writer = ContainerWriter::new(file, library, period_bytes)?;
         let shared = foxglove_descriptors();
         let weights = series_descriptors("Weights", &self.info.weight_names);
         let stats = series_descriptors("Stats", &self.info.stat_names);
-        let plan: [(&'static str, &str, &[u8]); 9] = [
+        let mut plan: Vec<(&'static str, &str, &[u8])> = vec![
             (topics::TF, "foxglove.FrameTransforms", &shared),
             (topics::SKIN, "foxglove.SceneUpdate", &shared),
             (topics::PATCHES, "foxglove.SceneUpdate", &shared),
@@ -111,6 +118,9 @@ impl McapRecorder {
             (topics::STATS, "fabrig.Stats", &stats),
             (topics::LOG, "foxglove.Log", &shared),
         ];
+        if self.records_strain() {
+            plan.push((topics::STRAIN, "foxglove.SceneUpdate", &shared));
+        }
         let listed = |names: &[String]| {
             let fields: Vec<String> = names.iter().map(|name| field_name(name)).collect();
             fields.join(",")
@@ -119,31 +129,29 @@ impl McapRecorder {
             (topics::WEIGHTS, listed(&self.info.weight_names)),
             (topics::STATS, listed(&self.info.stat_names)),
         ];
-        let metadata = self.metadata();
-        let layout = foxglove_layout(&self.info).into_bytes();
-        let opened = self.with_writer(|writer| {
-            writer.add_metadata("fabrig", &metadata)?;
-            writer.attach("fabrig.foxglove.json", "application/json", &layout)?;
-            let mut channels = Vec::new();
-            for (topic, schema, descriptors) in plan {
-                let schema = writer.add_schema(schema, descriptors)?;
-                // Viewers' helpers read the plotted names here without decoding the schema.
-                let mut metadata = BTreeMap::new();
-                if let Some((_, names)) = series.iter().find(|(t, _)| *t == topic) {
-                    metadata.insert("fields".to_owned(), names.clone());
-                }
-                let id = writer.add_channel(schema, topic, &metadata)?;
-                channels.push(Channel {
-                    id,
-                    topic,
-                    messages: 0,
-                    raw_bytes: 0,
-                });
+        let plotted = listed(&plotted_weights(&self.info));
+        let layout = foxglove_layout(&self.info, &self.options).into_bytes();
+        writer.add_metadata("fabrig", &self.metadata())?;
+        writer.attach("fabrig.foxglove.json", "application/json", &layout)?;
+        for (topic, schema, descriptors) in plan {
+            let schema = writer.add_schema(schema, descriptors)?;
+            // Viewers' helpers read the plotted names here without decoding the schema.
+            let mut metadata = BTreeMap::new();
+            if let Some((_, names)) = series.iter().find(|(t, _)| *t == topic) {
+                metadata.insert("fields".to_owned(), names.clone());
             }
-            Ok(channels)
-        });
-        self.channels = opened?;
-        Ok(())
+            if topic == topics::WEIGHTS {
+                metadata.insert("plotted".to_owned(), plotted.clone());
+            }
+            let id = writer.add_channel(schema, topic, &metadata)?;
+            self.channels.push(Channel {
+                id,
+                topic,
+                messages: 0,
+                raw_bytes: 0,
+            });
+        }
+        BackgroundWriter::new(writer, self.options.chunk_bytes)
     }
 
     fn metadata(&self) -> BTreeMap<String, String> {
@@ -163,7 +171,14 @@ impl McapRecorder {
         ] {
             metadata.insert(key.to_owned(), value);
         }
+        if self.records_strain() {
+            metadata.insert("strain_full_scale".to_owned(), FULL_SCALE.to_string());
+        }
         metadata
+    }
+
+    fn records_strain(&self) -> bool {
+        self.options.strain_hz > 0.0 && !self.info.patches.is_empty()
     }
 
     /// Simulated time of the next frame. (ns)
@@ -189,9 +204,10 @@ impl McapRecorder {
         let due = |hz: f64| {
             stride(self.info.fps, hz).is_some_and(|stride| self.frames.is_multiple_of(stride))
         };
-        let (skin_due, patches_due, points_due) = (
+        let (skin_due, patches_due, strain_due, points_due) = (
             due(self.options.skin_hz),
             due(self.options.patches_hz),
+            due(self.options.strain_hz),
             due(self.options.points_hz),
         );
         self.send(
@@ -210,6 +226,15 @@ impl McapRecorder {
         if patches_due && !frame.patches.is_empty() {
             let scene = self.patches.scene(now, frame.patches);
             self.send(topics::PATCHES, now, &scene)?;
+        }
+        if strain_due && self.records_strain() {
+            let colors = frame.strains.iter().map(|strains| {
+                let strains = strains.iter();
+                strains.map(|&strain| strain_color(strain)).collect()
+            });
+            let colors: Vec<Vec<[u8; 4]>> = colors.collect();
+            let scene = self.strained.colored_scene(now, frame.patches, &colors);
+            self.send(topics::STRAIN, now, &scene)?;
         }
         if points_due {
             let cloud = self.skin.cloud(now, &[frame.skin]).encode_to_vec();
@@ -286,6 +311,18 @@ impl McapRecorder {
         for (info, positions) in patches.chain(self.info.parts.iter().zip(frame.parts)) {
             surface(info, positions)?;
         }
+        if self.records_strain() {
+            shape(
+                "patch strains",
+                self.info.patches.len(),
+                frame.strains.len(),
+            )?;
+            for (info, strains) in self.info.patches.iter().zip(frame.strains) {
+                let what = format!("strains of `{}`", info.name);
+                shape(&what, info.vertex_count, strains.len())?;
+                finite(&what, strains.iter().position(|s| !s.is_finite()))?;
+            }
+        }
         let weights = frame.weights.iter().position(|w| !w.is_finite());
         finite("weight", weights)?;
         finite("stat", frame.stats.iter().position(|s| !s.is_finite()))?;
@@ -332,12 +369,11 @@ impl McapRecorder {
             message: format!("end after {} frames", self.frames),
         };
         self.log(self.log_time_nanos(), &event)?;
-        self.with_writer(|writer| {
-            writer.finish()?;
-            writer.get_ref().get_ref().sync_all()
-        })?;
-        self.writer = None;
-        Ok(())
+        let closed = match self.writer.take() {
+            Some(writer) => writer.finish().and_then(|file| file.get_ref().sync_all()),
+            None => Err(io::Error::other("the recording is closed")),
+        };
+        closed.map_err(|error| self.io_error("write", error))
     }
 
     fn send(&mut self, topic: &'static str, now: u64, data: &[u8]) -> Result<(), RecordingError> {
@@ -353,7 +389,7 @@ impl McapRecorder {
 
     fn with_writer<T>(
         &mut self,
-        act: impl FnOnce(&mut ContainerWriter<BufWriter<File>>) -> io::Result<T>,
+        act: impl FnOnce(&mut BackgroundWriter<BufWriter<File>>) -> io::Result<T>,
     ) -> Result<T, RecordingError> {
         let result = match &mut self.writer {
             Some(writer) => act(writer),

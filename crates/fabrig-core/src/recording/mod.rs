@@ -23,6 +23,8 @@
 //! A recording is a record of what moved, not an exchange format: it has neither texture
 //! coordinates nor the rig. Viewers read the shaded meshes at 30 frames a second or less.
 
+mod background;
+mod chunk;
 mod container;
 mod encode;
 mod error;
@@ -32,6 +34,7 @@ mod mcap_recorder;
 mod messages;
 mod reader;
 mod schema;
+mod strain;
 
 pub use error::RecordingError;
 pub use frame::{

@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use image::codecs::gif::{GifEncoder, Repeat};
-use image::{Delay, Frame, ImageBuffer, Rgba};
+use gif::{DisposalMethod, Encoder, Frame, Repeat};
+use image::ImageError;
+use image::error::{EncodingError, ImageFormatHint};
 
 use super::image_buffer::write_whole;
+use super::palette::{Palette, UNCHANGED};
 use super::sheet::check_same_size;
 use super::{Image, RenderError};
 
-/// Writes frames as an endless GIF.
+/// Writes frames as an endless GIF with one palette for all of them.
 ///
 /// - `frame_secs`: time each frame stays (s); GIF counts hundredths, and most viewers slow
 ///   anything below 0.02 s down.
@@ -27,20 +29,46 @@ pub fn write_gif(
         return Err(RenderError::NoFrames);
     }
     check_same_size(frames)?;
-    let hundredths = (frame_secs * 100.0).round().clamp(1.0, 6000.0) as u32;
+    let hundredths = (frame_secs * 100.0).round().clamp(1.0, 6000.0) as u16;
+    let [width, height] = [frames[0].width(), frames[0].height()].map(|side| side as u16);
+    let palette = Palette::of(frames);
     write_whole(path.as_ref(), |out| {
-        let mut encoder = GifEncoder::new_with_speed(out, 10);
-        encoder.set_repeat(Repeat::Infinite)?;
+        let mut encoder = Encoder::new(out, width, height, palette.colors()).map_err(encoding)?;
+        encoder.set_repeat(Repeat::Infinite).map_err(encoding)?;
+        let mut shown: Vec<u8> = Vec::new();
         for frame in frames {
-            let opaque = frame.bytes().chunks_exact(3);
-            let rgba: Vec<u8> = opaque.flat_map(|p| [p[0], p[1], p[2], 255]).collect();
-            let buffer = ImageBuffer::<Rgba<u8>, _>::from_raw(frame.width(), frame.height(), rgba)
-                .unwrap_or_default();
-            let delay = Delay::from_numer_denom_ms(hundredths * 10, 1);
-            encoder.encode_frame(Frame::from_parts(buffer, 0, 0, delay))?;
+            let indices = palette.indices(frame);
+            let changed = |(&now, &before): (&u8, &u8)| if now == before { UNCHANGED } else { now };
+            let buffer = if shown.is_empty() {
+                indices.clone()
+            } else {
+                indices.iter().zip(&shown).map(changed).collect()
+            };
+            shown = indices;
+            encoder
+                .write_frame(&Frame {
+                    delay: hundredths,
+                    dispose: DisposalMethod::Keep,
+                    transparent: Some(UNCHANGED),
+                    width,
+                    height,
+                    buffer: buffer.into(),
+                    ..Frame::default()
+                })
+                .map_err(encoding)?;
         }
         Ok(())
     })
+}
+
+fn encoding(error: gif::EncodingError) -> ImageError {
+    match error {
+        gif::EncodingError::Io(error) => ImageError::IoError(error),
+        other => ImageError::Encoding(EncodingError::new(
+            ImageFormatHint::Exact(image::ImageFormat::Gif),
+            other,
+        )),
+    }
 }
 
 #[cfg(test)]

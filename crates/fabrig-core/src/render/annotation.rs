@@ -110,7 +110,21 @@ fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
     placed
 }
 
-/// Writes every name at the margin on its side of the picture.
+/// Space between a name and the picture's edge, and between it and its line. (pixels)
+const NAME_SPACE: i32 = 6;
+
+/// Share of the picture's width that its widest name takes at the margin.
+pub(super) fn label_margin(labels: &[Label], width: u32, height: u32) -> f64 {
+    let text_size = text_height(height);
+    let widths = labels
+        .iter()
+        .map(|label| text_width(&label.text, text_size));
+    let widest = widths.max().map_or(0, |widest| widest + 3 * NAME_SPACE);
+    f64::from(widest) / f64::from(width)
+}
+
+/// Writes every name at the margin on its side of the picture. The names of a side end at one
+/// line towards the middle, so that no leader crosses a name.
 pub(super) fn draw_labels(image: &mut Image, labels: &[Label], camera: &Camera) {
     let (width, height) = (image.width(), image.height());
     let text_size = text_height(height);
@@ -132,10 +146,14 @@ pub(super) fn draw_labels(image: &mut Image, labels: &[Label], camera: &Camera) 
     for (side, mut items) in sides.into_iter().enumerate() {
         items.sort_by(|a, b| a.1[1].total_cmp(&b.1[1]));
         let gap = f64::from(text_size) * 1.25;
+        let widths = items
+            .iter()
+            .map(|(label, _)| text_width(&label.text, text_size));
+        let column = NAME_SPACE + widths.max().unwrap_or(0);
         let wishes: Vec<f64> = items.iter().map(|(_, at)| at[1]).collect();
         let heights = spread(&wishes, gap, gap, f64::from(height) - gap);
         for ((label, at), y) in items.into_iter().zip(heights) {
-            draw_label(image, label, at, y, side == 1, text_size);
+            draw_label(image, label, at, [f64::from(column), y], side == 1);
         }
     }
 }
@@ -144,17 +162,17 @@ fn draw_label(
     image: &mut Image,
     label: &Label,
     at: [f64; 2],
-    y: f64,
+    [column, y]: [f64; 2],
     is_right: bool,
-    text_size: u32,
 ) {
-    let margin = 6;
     let width = image.width() as i32;
-    let text_end = margin + text_width(&label.text, text_size) + 4;
+    let text_size = text_height(image.height());
+    let column = column as i32;
     let (x, line_x, alignment) = if is_right {
-        (width - margin, width - text_end, Alignment::Right)
+        let x = width - column;
+        (x, x - NAME_SPACE, Alignment::Left)
     } else {
-        (margin, text_end, Alignment::Left)
+        (column, column + NAME_SPACE, Alignment::Right)
     };
     let y = y.round() as i32;
     let ground = image

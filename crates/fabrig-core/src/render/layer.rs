@@ -89,6 +89,7 @@ pub struct Layer {
     pub(super) opacity: f32,
     pub(super) is_smooth: bool,
     pub(super) edges: Option<Edges>,
+    pub(super) is_lit_alone: bool,
 }
 
 impl Layer {
@@ -161,6 +162,7 @@ impl Layer {
             opacity: 1.0,
             is_smooth: true,
             edges: None,
+            is_lit_alone: false,
         })
     }
 
@@ -215,6 +217,18 @@ impl Layer {
     pub fn with_flat_shading(mut self) -> Self {
         self.is_smooth = false;
         self
+    }
+
+    /// Neither casts shadows nor receives them: for what is laid over a scene to be read, such
+    /// as a diagram, rather than stands in it.
+    pub fn with_light_of_its_own(mut self) -> Self {
+        self.is_lit_alone = true;
+        self
+    }
+
+    /// Whether it casts shadows and receives them.
+    pub(super) fn has_shadows(&self) -> bool {
+        self.opacity >= 1.0 && !self.is_lit_alone
     }
 
     /// Where its vertices are.

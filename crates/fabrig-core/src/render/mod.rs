@@ -24,6 +24,7 @@ mod face;
 mod image_buffer;
 mod layer;
 mod light;
+mod palette;
 mod picture;
 mod sheet;
 mod subjects;

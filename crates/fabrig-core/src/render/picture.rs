@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::annotation::{draw_labels, draw_legend};
+use super::annotation::{draw_labels, draw_legend, label_margin};
 use super::image_buffer::check_size;
 use super::layer::Paint;
 use super::light::{Exposure, Lights, expose};
@@ -125,8 +125,8 @@ impl Picture {
         self
     }
 
-    /// Share of the picture left free (across, down) on each side, each below 0.5; labels need
-    /// about 0.25 across.
+    /// Share of the picture left free (across, down) on each side, each below 0.5; labels take
+    /// the room they need.
     pub fn with_margins(mut self, across: f64, down: f64) -> Self {
         self.margins = (across.clamp(0.0, 0.45), down.clamp(0.0, 0.45));
         self
@@ -228,11 +228,14 @@ impl Picture {
             .iter()
             .flat_map(|set| set.centers.iter().copied());
         let all = used.chain(centers);
+        let (across, down) = self.margins;
+        let names = label_margin(&self.labels, self.width, self.height);
+        let margins = (across.max(names).min(0.45), down);
         if self.focus.is_empty() {
-            Camera::framing(view, all, aspect, self.margins, self.is_orthographic)
+            Camera::framing(view, all, aspect, margins, self.is_orthographic)
         } else {
             let focus = self.focus.iter().copied();
-            Camera::framing(view, focus, aspect, self.margins, self.is_orthographic)
+            Camera::framing(view, focus, aspect, margins, self.is_orthographic)
         }
     }
 }
@@ -262,13 +265,13 @@ impl<'a> Stage<'a> {
         let lights = Lights::about(&camera);
         let occludes = |primitive: u32| {
             (primitive as usize) < corners.len()
-                && picture.layers[owners[primitive as usize] as usize].opacity >= 1.0
+                && picture.layers[owners[primitive as usize] as usize].has_shadows()
         };
         let mut layers = Vec::new();
         let mut start = 0;
         for layer in &picture.layers {
             let normals = layer.vertex_normals();
-            let exposures = if layer.opacity < 1.0 {
+            let exposures = if !layer.has_shadows() {
                 vec![Exposure::FULL; normals.len()]
             } else {
                 lights.bake(&layer.positions, &normals, &tracer, occludes)

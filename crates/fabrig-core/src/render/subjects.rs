@@ -28,7 +28,7 @@ pub fn template_layers(template: &Template, look: &FaceLook) -> Result<Vec<Layer
 ///
 /// [`RenderError::IndexOutOfRange`] when there are fewer positions than nodes.
 pub fn patch_layer(chart: &PatchChart, positions: Vec<Point>) -> Result<Layer, RenderError> {
-    let quads = Polygons::from_faces(chart.grid.quads());
+    let quads = Polygons::from_faces(chart.quads());
     Ok(Layer::from_polygons(positions, &quads)?
         .with_color(Rgb::from_srgb(chart.color))
         .with_material(Material::MATTE))
