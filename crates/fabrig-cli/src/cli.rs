@@ -227,9 +227,25 @@ pub(crate) struct DemoArgs {
     pub(crate) scene: SceneArgs,
 }
 
+/// A part of a face that a picture is framed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Zoom {
+    /// Everything there is
+    All,
+    /// From the hairline to the chin of an open jaw
+    Face,
+    /// From the wings of the nose to the chin
+    Mouth,
+    /// Brows to cheekbones
+    Eyes,
+    /// The left eye
+    Eye,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// Mesh, rig (.fabrig) or recording (.mcap); `demo` and `template` are the bundled ones
+    /// Mesh, rig (.fabrig), recording (.mcap) or folder of a template; `demo` and `template` are
+    /// the bundled ones
     pub(crate) input: PathBuf,
     /// PNG, or GIF for a recording
     #[arg(short, long, value_name = "OUT.png")]
@@ -252,9 +268,15 @@ pub(crate) struct RenderArgs {
     /// Pose of a rig, held until still: SHAPE=WEIGHT,...; each one is a row
     #[arg(long, value_name = "POSE", conflicts_with = "expressions")]
     pub(crate) pose: Vec<String>,
-    /// A sheet of ten expressions of a rig
+    /// A sheet of twelve expressions of a rig, closer on the face
     #[arg(long)]
     pub(crate) expressions: bool,
+    /// A sheet of every shape of a rig at weight 1, one tile each
+    #[arg(long, conflicts_with_all = ["expressions", "pose"])]
+    pub(crate) all_shapes: bool,
+    /// What of a rig or the template fills the picture; sheets show the face, anything else all
+    #[arg(long, value_enum)]
+    pub(crate) zoom: Option<Zoom>,
     /// Time of the frame of a recording, in seconds
     #[arg(long, value_name = "SECS")]
     pub(crate) time: Option<f64>,

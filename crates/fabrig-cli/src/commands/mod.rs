@@ -8,8 +8,10 @@ mod info;
 mod pose;
 mod render;
 mod rig;
+mod subjects;
 mod template;
 mod viewers;
+mod zoom;
 
 use std::path::Path;
 

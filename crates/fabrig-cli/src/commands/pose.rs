@@ -4,7 +4,7 @@ use anyhow::{Result, anyhow, ensure};
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 
 /// The expressions of the sheet that `fabrig render --expressions` draws.
-pub(super) const EXPRESSIONS: [(&str, &str); 10] = [
+pub(super) const EXPRESSIONS: [(&str, &str); 12] = [
     ("smile", "mouthSmile=1,cheekSquint=0.7,eyeSquint=0.3"),
     ("jaw open", "jawOpen=1"),
     ("blink", "eyeBlink=1"),
@@ -15,6 +15,14 @@ pub(super) const EXPRESSIONS: [(&str, &str); 10] = [
     ("funnel", "mouthFunnel=1,jawOpen=0.2"),
     ("frown", "mouthFrown=1,mouthShrugLower=0.5,browInnerUp=0.5"),
     ("puff", "cheekPuff=1"),
+    (
+        "disgust",
+        "noseSneerLeft=1,mouthUpperUpLeft=0.8,eyeSquintLeft=0.6,browDown=0.5,mouthFrown=0.4",
+    ),
+    (
+        "grimace",
+        "mouthStretch=1,mouthLowerDown=0.8,jawOpen=0.15,browInnerUp=0.6",
+    ),
 ];
 
 /// Weights in the order of `shapes`; names in any spelling, without a side for both.

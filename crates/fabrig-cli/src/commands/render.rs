@@ -1,34 +1,25 @@
 //! `fabrig render`: pictures of meshes, rigs and recordings.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use fabrig_core::Point;
-use fabrig_core::mesh::Polygons;
 use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::RigFaceOptions;
 use fabrig_core::recording::RecordingReader;
 use fabrig_core::render::{
-    Edges, FaceLook, Image, Label, Layer, Picture, RecordingContent, Rgb, Sheet, View, mesh_layers,
-    patch_layer, recording_layers, template_layers, write_gif,
+    Edges, FaceLook, Image, Layer, Picture, RecordingContent, Sheet, View, mesh_layers,
+    recording_layers, write_gif,
 };
 use fabrig_core::rig::Rig;
-use fabrig_core::scene::{FacePose, Scene, Simulation, hold_pose};
-use fabrig_core::template;
+use fabrig_core::template::{self, Template};
 
 use super::animate::load_rig;
-use super::pose::{EXPRESSIONS, parse_pose};
+use super::subjects::{Subject, rig_subjects, template_subjects};
+use super::zoom::focus;
 use super::{Outcome, check_output, rig};
-use crate::cli::RenderArgs;
+use crate::cli::{RenderArgs, Zoom};
 use crate::console::Console;
-
-/// What is in one picture before it is looked at from somewhere.
-struct Subject {
-    caption: String,
-    layers: Vec<Layer>,
-    labels: Vec<Label>,
-}
 
 pub(crate) fn run(console: &Console, args: &RenderArgs) -> Result<Outcome> {
     check_output(&args.output)?;
@@ -52,60 +43,97 @@ pub(crate) fn run(console: &Console, args: &RenderArgs) -> Result<Outcome> {
         ),
         ("demo", _) => {
             let rigged = rig::rig(console, &template::demo_face(), &RigFaceOptions::default())?;
-            compose(
-                console,
-                args,
-                &views,
-                rig_subjects(console, rigged.rig, args)?,
-            )
+            render_rig(console, args, &views, rigged.rig)
         }
         (_, Some("fabrig")) => {
             let rig = load_rig(&args.input)?;
-            compose(console, args, &views, rig_subjects(console, rig, args)?)
+            render_rig(console, args, &views, rig)
         }
-        ("template", _) => {
-            let layers = template_layers(template::human(), &look)?;
+        ("template", _) => render_template(console, args, &views, template::human()),
+        _ if args.input.is_dir() => {
+            render_template(console, args, &views, &Template::load(&args.input)?)
+        }
+        _ => {
+            ensure!(
+                args.pose.is_empty()
+                    && !args.expressions
+                    && !args.all_shapes
+                    && !args.patches
+                    && args.zoom.is_none(),
+                "{}: only a rig has poses, patches and parts to zoom in on; make one with \
+                 `fabrig rig`",
+                args.input.display()
+            );
+            let layers = mesh_layers(&read_mesh(&args.input)?, &look)?;
             compose(
                 console,
                 args,
                 &views,
-                vec![Subject::plain("template", layers)],
+                vec![Subject::plain("", layers)],
+                Vec::new(),
             )
         }
-        _ => {
-            ensure!(
-                args.pose.is_empty() && !args.expressions && !args.patches,
-                "{}: only a rig has poses and patches; make one with `fabrig rig`",
-                args.input.display()
-            );
-            let layers = mesh_layers(&read_mesh(&args.input)?, &look)?;
-            compose(console, args, &views, vec![Subject::plain("", layers)])
-        }
     }
 }
 
-impl Subject {
-    fn plain(caption: &str, layers: Vec<Layer>) -> Self {
-        Self {
-            caption: caption.to_owned(),
-            layers,
-            labels: Vec::new(),
-        }
+fn render_template(
+    console: &Console,
+    args: &RenderArgs,
+    views: &[View],
+    template: &Template,
+) -> Result<Outcome> {
+    ensure!(
+        !args.patches,
+        "a template alone has no patches; rig a face with `fabrig rig`"
+    );
+    let zoom = args.zoom.unwrap_or(default_zoom(args));
+    let focus = focus(zoom, template, template.skin.positions(), &template.jaw);
+    let subjects = template_subjects(template, args)?;
+    compose(console, args, views, subjects, focus)
+}
+
+/// Sheets of faces show the face, a single picture the whole head.
+fn default_zoom(args: &RenderArgs) -> Zoom {
+    if (args.expressions || args.all_shapes) && !args.patches {
+        Zoom::Face
+    } else {
+        Zoom::All
     }
 }
 
-/// One picture per subject and view, in a grid, to a PNG.
+fn render_rig(console: &Console, args: &RenderArgs, views: &[View], rig: Rig) -> Result<Outcome> {
+    let zoom = args.zoom.unwrap_or(default_zoom(args));
+    let template = template::human();
+    let focus = focus(zoom, template, &rig.positions, &rig.jaw.hinge);
+    ensure!(
+        zoom == Zoom::All || !focus.is_empty(),
+        "the rig was made with another template ({}): it cannot be zoomed in on",
+        rig.template
+    );
+    compose(
+        console,
+        args,
+        views,
+        rig_subjects(console, rig, args)?,
+        focus,
+    )
+}
+
+/// One picture per subject and view, in a grid, to a PNG. Pictures hold the points of `focus`,
+/// or all of the first subject where there are none.
 fn compose(
     console: &Console,
     args: &RenderArgs,
     views: &[View],
     subjects: Vec<Subject>,
+    mut focus: Vec<Point>,
 ) -> Result<Outcome> {
     // Every picture is framed as the first, so that poses can be compared.
-    let focus = subjects
-        .first()
-        .map(|s| points(&s.layers))
-        .unwrap_or_default();
+    if focus.is_empty()
+        && let Some(first) = subjects.first()
+    {
+        focus = points(&first.layers);
+    }
     let columns = if views.len() > 1 || subjects.len() < 4 {
         views.len().max(1)
     } else {
@@ -164,116 +192,6 @@ fn picture(args: &RenderArgs, view: View, subject: &Subject, focus: &[Point]) ->
             .with_labels(subject.labels.iter().cloned());
     }
     Ok(picture.render()?)
-}
-
-/// The poses asked for, or the neutral face.
-fn rig_subjects(console: &Console, rig: Rig, args: &RenderArgs) -> Result<Vec<Subject>> {
-    let poses: Vec<(String, Vec<f32>)> = if args.expressions {
-        EXPRESSIONS
-            .iter()
-            .map(|(name, text)| Ok(((*name).to_owned(), parse_pose(text, &rig.shape_names)?)))
-            .collect::<Result<_>>()?
-    } else if args.pose.is_empty() {
-        vec![(String::new(), vec![0.0; rig.shape_names.len()])]
-    } else {
-        args.pose
-            .iter()
-            .map(|text| Ok((text.clone(), parse_pose(text, &rig.shape_names)?)))
-            .collect::<Result<_>>()?
-    };
-    let mut simulation = Simulation::new(Arc::new(rig), Scene::default(), None)?;
-    let count = poses.len() as u64;
-    let mut subjects = Vec::with_capacity(poses.len());
-    for (index, (caption, weights)) in poses.into_iter().enumerate() {
-        let mut pose = FacePose::neutral(weights.len());
-        pose.weights = weights;
-        hold_pose(&mut simulation, &pose)?;
-        let layers = if args.patches {
-            patch_layers_now(&simulation)?
-        } else {
-            face_layers(&simulation)?
-        };
-        let labels = if args.names {
-            patch_labels(&simulation)
-        } else {
-            Vec::new()
-        };
-        subjects.push(Subject {
-            caption,
-            layers,
-            labels,
-        });
-        if console
-            .show("settle", index as u64 + 1, count, "")
-            .is_break()
-        {
-            bail!("stopped; nothing was written");
-        }
-    }
-    Ok(subjects)
-}
-
-/// Skin and loose parts of a simulated face.
-fn face_layers(simulation: &Simulation) -> Result<Vec<Layer>> {
-    let look = FaceLook::default();
-    let rig = simulation.rig();
-    let skin: Vec<Point> = simulation.skin().iter().map(|p| p.cast()).collect();
-    let mut owner = vec![None; skin.len()];
-    for (part, piece) in rig.parts.iter().enumerate() {
-        for (k, &vertex) in piece.vertices.iter().enumerate() {
-            owner[vertex as usize] = Some((part, k as u32));
-        }
-    }
-    let mut skin_polygons = Polygons::new();
-    let mut part_polygons = vec![Polygons::new(); rig.parts.len()];
-    for face in rig.face.polygons().iter() {
-        let places: Option<Vec<(usize, u32)>> = face.iter().map(|&v| owner[v as usize]).collect();
-        match places {
-            Some(places) => {
-                let corners: Vec<u32> = places.iter().map(|p| p.1).collect();
-                part_polygons[places[0].0].push(&corners);
-            }
-            None => skin_polygons.push(face),
-        }
-    }
-    let mut layers = vec![look.skin(skin.clone(), &skin_polygons)?];
-    for ((part, polygons), pose) in rig.parts.iter().zip(&part_polygons).zip(simulation.parts()) {
-        if polygons.is_empty() {
-            continue;
-        }
-        let positions = part.vertices.iter().map(|&v| skin[v as usize]).collect();
-        let gaze = pose.motion.rotation * fabrig_core::Vector::z();
-        layers.push(look.part(&part.name, positions, polygons, gaze)?);
-    }
-    Ok(layers)
-}
-
-fn patch_layers_now(simulation: &Simulation) -> Result<Vec<Layer>> {
-    let patches = simulation.rig().patches.iter().enumerate();
-    patches
-        .map(|(index, patch)| {
-            let nodes = simulation.patch_positions(index);
-            let nodes = nodes.iter().map(|p| p.cast()).collect();
-            Ok(patch_layer(&patch.patch.chart, nodes)?)
-        })
-        .collect()
-}
-
-fn patch_labels(simulation: &Simulation) -> Vec<Label> {
-    let patches = simulation.rig().patches.iter().enumerate();
-    patches
-        .map(|(index, patch)| {
-            let chart = &patch.patch.chart;
-            let middle = chart
-                .grid
-                .index(chart.grid.u_count / 2, chart.grid.v_count / 2);
-            Label {
-                anchor: simulation.patch_positions(index)[middle].cast(),
-                text: chart.name.replace('_', " "),
-                color: Rgb::from_srgb(chart.color),
-            }
-        })
-        .collect()
 }
 
 /// One frame of a recording to a PNG, or all of it to a GIF.
@@ -347,5 +265,5 @@ fn render_recording(
     }
     let subject = last_subject
         .with_context(|| format!("{} has no frame with a mesh", args.input.display()))?;
-    compose(console, args, views, vec![subject])
+    compose(console, args, views, vec![subject], Vec::new())
 }

@@ -41,5 +41,6 @@ pub use layer::{Edges, Layer, Material, Paint, Points};
 pub use picture::{Background, Picture, Shot};
 pub use sheet::Sheet;
 pub use subjects::{
-    RecordingContent, patch_layer, patch_layers, recording_layers, template_layers,
+    RecordingContent, patch_layer, patch_layers, posed_template_layers, recording_layers,
+    template_layers,
 };

@@ -4,7 +4,8 @@ use super::{FaceLook, Label, Layer, Material, RenderError, Rgb};
 use crate::anatomy::{Patch, PatchChart};
 use crate::mesh::Polygons;
 use crate::recording::{RecordedFrame, RecordedSurface};
-use crate::template::Template;
+use crate::template::{EyeSocket, RigidBody, Template};
+use crate::transfer::{EyeShapes, JawPose, JawShapes};
 use crate::{Point, Vector};
 
 /// The template's skin and rigid parts at rest.
@@ -13,13 +14,70 @@ use crate::{Point, Vector};
 ///
 /// As [`Layer::from_polygons`].
 pub fn template_layers(template: &Template, look: &FaceLook) -> Result<Vec<Layer>, RenderError> {
-    let skin = &template.skin;
-    let mut layers = vec![look.skin(skin.positions().to_vec(), skin.polygons())?];
-    for part in &template.rigid_parts {
-        let positions = part.mesh.positions().to_vec();
-        layers.push(look.part(&part.name, positions, part.mesh.polygons(), Vector::z())?);
+    posed_template_layers(template, &vec![0.0; template.shapes.len()], look)
+}
+
+/// The template under its own shapes, as the pack has them: a plain weighted sum for the skin,
+/// the hinge for lower teeth and tongue, turned eyes. Nothing is simulated.
+///
+/// - `weights`: one per shape of the template; shapes without one stay at rest
+///
+/// # Errors
+///
+/// As [`Layer::from_polygons`].
+pub fn posed_template_layers(
+    template: &Template,
+    weights: &[f32],
+    look: &FaceLook,
+) -> Result<Vec<Layer>, RenderError> {
+    let weight = |shape: usize| f64::from(weights.get(shape).copied().unwrap_or(0.0));
+    let mut skin = template.skin.positions().to_vec();
+    for (shape, whole) in template.shapes.iter().enumerate() {
+        for (vertex, delta) in whole.deltas.iter().filter(|_| weight(shape) != 0.0) {
+            skin[*vertex as usize] += weight(shape) * delta;
+        }
+    }
+    let mut layers = vec![look.skin(skin, template.skin.polygons())?];
+    let mut all = weights.to_vec();
+    all.resize(template.shapes.len(), 0.0);
+    let jaw = JawPose::at(&template.jaw, &JawShapes::of(template), 1.0, &all);
+    let (turn, slide) = jaw.affine(&template.jaw);
+    let eyes = EyeShapes::of(template);
+    for (index, part) in (0u32..).zip(&template.rigid_parts) {
+        let mut positions = part.mesh.positions().to_vec();
+        for (shape, of_part, deltas) in &template.part_deltas {
+            for (p, d) in positions.iter_mut().zip(deltas) {
+                if *of_part == index {
+                    *p += weight(*shape as usize) * d;
+                }
+            }
+        }
+        if part.follows == RigidBody::Mandible {
+            for p in &mut positions {
+                *p = Point::from(turn * p.coords + slide);
+            }
+        }
+        let gaze = match part.follows {
+            RigidBody::EyeLeft => gaze(&template.eyes[0], &eyes[0], 1.0, &weight),
+            RigidBody::EyeRight => gaze(&template.eyes[1], &eyes[1], -1.0, &weight),
+            _ => Vector::z(),
+        };
+        layers.push(look.part(&part.name, positions, part.mesh.polygons(), gaze)?);
     }
     Ok(layers)
+}
+
+/// Where an eye looks; `out` is +1 for the eye at +X.
+fn gaze(socket: &EyeSocket, shapes: &EyeShapes, out: f64, weight: &dyn Fn(usize) -> f64) -> Vector {
+    let angle = |k: usize| {
+        shapes.look[k].map_or(0.0, |shape| weight(shape as usize)) * socket.look_angles[k]
+    };
+    let (pitch, yaw) = (angle(0) - angle(1), out * (angle(3) - angle(2)));
+    Vector::new(
+        yaw.sin() * pitch.cos(),
+        pitch.sin(),
+        yaw.cos() * pitch.cos(),
+    )
 }
 
 /// One patch in its chart's colour; `positions` are one per grid node.

@@ -78,6 +78,12 @@ pub(super) struct BuildRecipe {
     pub(super) gain: BTreeMap<String, f64>,
     /// How the lids are put right.
     pub(super) lids: LidRecipe,
+    /// Half the width of the blend between shapes of the left and of the right. (mm)
+    pub(super) side_blend: f64,
+    /// How shapes are smoothed.
+    pub(super) fairing: FairingRecipe,
+    /// How wide the lips stand open.
+    pub(super) aperture: ApertureRecipe,
     /// How the lips are put right.
     pub(super) lips: LipRecipe,
     /// How inner skin is kept still.
@@ -98,10 +104,47 @@ pub(super) struct LidRecipe {
     pub(super) clearance: f64,
     /// How far from the margin corrections reach. (mm)
     pub(super) reach: f64,
-    /// How far corrections of neighbouring margin vertices mix. (mm)
-    pub(super) blur: f64,
+    /// Shapes whose lids are smoothed, and the length below which waves go. (mm)
+    pub(super) smoothing: BTreeMap<String, f64>,
     /// How much nearer to the eyeball's centre the next ring of the margin must be. (mm)
     pub(super) ring_step: f64,
+}
+
+/// How shapes are smoothed.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FairingRecipe {
+    /// Shapes and the length below which waves in them go. (mm)
+    pub(super) lengths: BTreeMap<String, f64>,
+    /// How much the lips count against other skin.
+    pub(super) lips: f64,
+    /// Shapes whose lips are smoothed like other skin.
+    pub(super) free_lips: Vec<String>,
+    /// Over which distance from the lips that fades. (mm)
+    pub(super) lips_reach: f64,
+    /// How much the mouth cavity counts: little, so that it follows the lips smoothly.
+    pub(super) cavity: f64,
+    /// Shapes that push skin together, and how high it rises where all its area is lost. (mm)
+    pub(super) bulge: BTreeMap<String, f64>,
+    /// The length below which waves in such a bulge go. (mm)
+    pub(super) bulge_length: f64,
+}
+
+/// How far the lips stand apart under the shapes, seen from the front.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ApertureRecipe {
+    /// Shapes under which the lips are closed.
+    pub(super) seal: Vec<String>,
+    /// Shapes under which they stand open no wider than at rest.
+    pub(super) keep: Vec<String>,
+    /// Shapes that open the lips up to the corners: the opening at a share f of the way there
+    /// is (1 - f^2)^power of that in the middle, or more.
+    pub(super) open: BTreeMap<String, f64>,
+    /// How far from where the lips meet the correction reaches. (mm)
+    pub(super) reach: f64,
+    /// Rounds.
+    pub(super) rounds: u32,
 }
 
 /// How shapes are corrected on inner skin.
@@ -113,6 +156,16 @@ pub(super) struct LiningRecipe {
     pub(super) socket: [f64; 2],
     /// Beginnings of the names of shapes that do not move the mouth cavity.
     pub(super) leave_mouth_still: Vec<String>,
+    /// Shapes under which the mouth cavity moves with the flesh around it.
+    pub(super) follow_flesh: Vec<String>,
+    /// How far apart outer skin is mixed for that. (mm)
+    pub(super) flesh_blur: f64,
+    /// Distances from outer skin up to which the lining moves fully, and from which not at all.
+    /// (mm)
+    pub(super) flesh_depth: [f64; 2],
+    /// Distances from the lips up to which the lining moves as drawn, and from which with the
+    /// flesh. (mm)
+    pub(super) flesh_from: [f64; 2],
 }
 
 /// How shapes are corrected at the lips.
@@ -125,8 +178,6 @@ pub(super) struct LipRecipe {
     pub(super) blur: f64,
     /// How deep the lining counts, behind the corner of the mouth. (mm)
     pub(super) lining: f64,
-    /// Half the width of the blend from side to side. (mm)
-    pub(super) side_blend: f64,
     /// Crossings that may stay. (mm)
     pub(super) tolerance: f64,
     /// Deeper overlaps are another part of the mouth, not a crossing. (mm)

@@ -4,13 +4,16 @@
 //! and miss each other. Both are put right in the shapes, by rule:
 //!
 //! - *closing*: the three edge rings of the upper lid's margin (front edge, middle, back edge)
-//!   are moved onto the same ring of the lower lid, a small gap above it; the correction fades
-//!   out over a reach along the lid, so that crease and brow stay as drawn.
+//!   are moved onto the same ring of the lower lid, a small gap above it, each vertex to the
+//!   place that lies as far along the eye as it does itself;
+//! - *smoothing*: between the margins and where the correction ends, the lid's skin is as
+//!   smooth as it can be, near to what was drawn;
 //! - *clearance*: a lid vertex may not come nearer to the eyeball's centre than the sphere plus
 //!   the clearance it has at rest, up to a cap: the lid slides over the sphere.
 
 use std::collections::BTreeMap;
 
+use super::fairing::{Fairing, distances, smooth_step};
 use super::identity::reflect;
 use super::regions::EdgeGraph;
 use crate::template::description::LidRecipe;
@@ -43,14 +46,35 @@ pub(super) struct Lids<'a> {
     mirror: &'a [u32],
     center: Point,
     radius: f64,
-    /// Rings of the upper margin without the corners: (vertex, ring).
-    upper_margin: Vec<(u32, u32)>,
-    /// Rings of the lower margin with the corners: (vertex, ring).
-    lower_margin: Vec<(u32, u32)>,
-    /// Vertices within reach of the margin: (vertex, whether it goes with the upper lid,
-    /// how much of the margin's correction it takes).
-    around: Vec<(u32, bool, f64)>,
+    /// Rings of the upper margin without the corners.
+    upper_margin: Vec<MarginVertex>,
+    /// Rings of the lower margin with the corners.
+    lower_margin: Vec<MarginVertex>,
+    /// Distance from the margin's front edge; infinite where no correction reaches. (mm)
+    near: Vec<f64>,
 }
+
+/// A vertex of a lid's edge.
+#[derive(Debug, Clone, Copy)]
+struct MarginVertex {
+    vertex: u32,
+    ring: u32,
+    /// How far along the eye it lies, 0 inner corner to 1 outer corner.
+    along: f64,
+}
+
+/// How much more the margins count than other skin when lids are smoothed.
+const MARGIN_HOLD: f64 = 30.0;
+/// The same for margins that are closed.
+const CLOSED_HOLD: f64 = 500.0;
+/// How much skin counts where the correction ends.
+const END_HOLD: f64 = 200.0;
+/// How much a closing lid counts as drawn: what closes it was drawn for other eyes.
+const CLOSING_SKIN: f64 = 0.3;
+/// Rounds of clearance and closing: each moves what the other set.
+const ROUNDS: u32 = 3;
+/// Share of the eye's length over which the gap of closed lids fades towards the corners.
+const GAP_FADE: f64 = 0.12;
 
 impl<'a> Lids<'a> {
     pub(super) fn new(
@@ -104,165 +128,161 @@ impl<'a> Lids<'a> {
                 }
             }
         }
-        let side = |is_upper: bool| -> Vec<(u32, u32)> {
+        let side = |is_upper: bool, chain: &[u32]| -> Vec<MarginVertex> {
             margin
                 .iter()
                 .filter(|(_, (_, u))| *u == is_upper)
-                .map(|(&v, &(ring, _))| (v, ring))
+                .map(|(&vertex, &(ring, _))| MarginVertex {
+                    vertex,
+                    ring,
+                    along: along(rest, chain, &rest[vertex as usize]),
+                })
                 .collect()
         };
-        let around = around(recipe, rest, &upper, &lower, &margin);
+        let edge: Vec<Point> = upper
+            .iter()
+            .chain(&lower)
+            .map(|&v| rest[v as usize])
+            .collect();
+        let mut near = distances(rest, &edge);
+        for (near, p) in near.iter_mut().zip(rest) {
+            if *near > recipe.reach || p.x <= 0.0 || p.z <= center.z {
+                *near = f64::INFINITY;
+            }
+        }
         Ok(Self {
             recipe,
             rest,
             mirror,
             center,
             radius,
-            upper_margin: side(true),
-            lower_margin: side(false),
-            around,
+            upper_margin: side(true, &upper),
+            lower_margin: side(false, &lower),
+            near,
         })
     }
 
     /// Corrects one shape at both eyes.
-    pub(super) fn correct(&self, name: &str, deltas: &mut [Vector]) {
-        self.correct_left(self.recipe.closing.iter().any(|n| n == name), deltas);
+    pub(super) fn correct(&self, name: &str, fairing: &Fairing, deltas: &mut [Vector]) {
         let mut mirrored: Vec<Vector> = self
             .mirror
             .iter()
             .map(|&image| reflect(deltas[image as usize]))
             .collect();
-        self.correct_left(false, &mut mirrored);
-        for &(vertex, _, _) in &self.around {
-            deltas[self.mirror[vertex as usize] as usize] = reflect(mirrored[vertex as usize]);
+        self.correct_left(name, fairing, deltas);
+        self.correct_left(name, fairing, &mut mirrored);
+        for (vertex, _) in self.reached() {
+            deltas[self.mirror[vertex] as usize] = reflect(mirrored[vertex]);
         }
     }
 
-    fn correct_left(&self, is_closing: bool, deltas: &mut [Vector]) {
-        if self
-            .around
-            .iter()
-            .all(|&(v, _, _)| deltas[v as usize] == Vector::zeros())
-        {
+    /// Vertices that corrections reach, and their distance from the edge.
+    fn reached(&self) -> impl Iterator<Item = (usize, f64)> {
+        let near = self.near.iter().copied().enumerate();
+        near.filter(|(_, d)| d.is_finite())
+    }
+
+    fn correct_left(&self, name: &str, fairing: &Fairing, deltas: &mut [Vector]) {
+        if self.reached().all(|(v, _)| deltas[v] == Vector::zeros()) {
             return;
         }
-        if is_closing {
-            // Clearance moves vertices along the sphere's radius and so changes where the
-            // margins are seen to meet: a few rounds settle both.
-            for _ in 0..4 {
+        let is_closing = self.recipe.closing.iter().any(|n| n == name);
+        if let Some(&length) = self.recipe.smoothing.get(name) {
+            let drawn = deltas.to_vec();
+            for _ in 0..if is_closing { ROUNDS } else { 1 } {
                 self.keep_clear(deltas);
-                self.close(deltas);
+                let (given, weights) = self.wanted(is_closing, &drawn, deltas);
+                let faired = fairing.solve(&given, &weights, length);
+                for (v, _) in self.reached() {
+                    deltas[v] = faired[v];
+                }
             }
         }
         self.keep_clear(deltas);
     }
 
-    /// Moves the upper margin onto the lower one.
-    fn close(&self, deltas: &mut [Vector]) {
-        let now = |v: u32, deltas: &[Vector]| self.rest[v as usize] + deltas[v as usize];
-        let mut corrections: Vec<(u32, Vector)> = Vec::new();
-        for ring in 0..RING_COUNT {
-            let mut curve: Vec<Point> = self
-                .lower_margin
-                .iter()
-                .filter(|(_, r)| *r == ring)
-                .map(|&(v, _)| now(v, deltas))
-                .collect();
-            curve.sort_by(|a, b| a.x.total_cmp(&b.x));
-            for &(vertex, _) in self.upper_margin.iter().filter(|(_, r)| *r == ring) {
-                let p = now(vertex, deltas);
-                if let Some(on_lower) = at_x(&curve, p.x) {
-                    let target = on_lower + Vector::new(0.0, self.recipe.gap, 0.0);
-                    corrections.push((vertex, target - p));
-                }
+    /// What lids are smoothed towards, and how much each vertex counts.
+    fn wanted(
+        &self,
+        is_closing: bool,
+        drawn: &[Vector],
+        deltas: &[Vector],
+    ) -> (Vec<Vector>, Vec<f64>) {
+        let mut given = drawn.to_vec();
+        let skin = if is_closing { CLOSING_SKIN } else { 1.0 };
+        let mut weights = vec![END_HOLD; drawn.len()];
+        let fade = self.recipe.reach * 0.4;
+        for (v, near) in self.reached() {
+            let t = smooth_step((near - fade) / (self.recipe.reach - fade));
+            weights[v] = skin + (END_HOLD - skin) * t;
+        }
+        let mut hold = |m: &MarginVertex, delta: Vector, weight: f64| {
+            given[m.vertex as usize] = delta;
+            weights[m.vertex as usize] = weight;
+        };
+        for m in &self.lower_margin {
+            hold(m, deltas[m.vertex as usize], MARGIN_HOLD);
+        }
+        for m in &self.upper_margin {
+            let rest = self.rest[m.vertex as usize];
+            match self.closed_at(m, deltas) {
+                Some(p) if is_closing => hold(m, p - rest, CLOSED_HOLD),
+                _ => hold(m, deltas[m.vertex as usize], MARGIN_HOLD),
             }
         }
-        let front: Vec<(Point, Vector)> = corrections
+        (given, weights)
+    }
+
+    /// Where a vertex of the upper margin goes when the lids close.
+    fn closed_at(&self, m: &MarginVertex, deltas: &[Vector]) -> Option<Point> {
+        let mut curve: Vec<(f64, Point)> = self
+            .lower_margin
             .iter()
-            .map(|&(v, c)| (self.rest[v as usize], c))
+            .filter(|l| l.ring == m.ring)
+            .map(|l| {
+                let v = l.vertex as usize;
+                (l.along, self.rest[v] + deltas[v])
+            })
             .collect();
-        let exact: BTreeMap<u32, Vector> = corrections.into_iter().collect();
-        for &(vertex, is_upper, share) in self.around.iter().filter(|(_, u, _)| *u) {
-            debug_assert!(is_upper);
-            let correction = exact.get(&vertex).copied().unwrap_or_else(|| {
-                share * nearby_mean(&front, &self.rest[vertex as usize], self.recipe.blur)
-            });
-            deltas[vertex as usize] += correction;
-        }
+        curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (first, last) = (curve.first()?, curve.last()?);
+        let s = m.along.clamp(first.0, last.0);
+        let on_lower = curve.windows(2).find_map(|pair| {
+            let ((a, p), (b, q)) = (pair[0], pair[1]);
+            (s <= b).then(|| p + (q - p) * if b > a { (s - a) / (b - a) } else { 0.0 })
+        })?;
+        let fade = (m.along.min(1.0 - m.along) / GAP_FADE).clamp(0.0, 1.0);
+        Some(on_lower + Vector::new(0.0, self.recipe.gap * fade, 0.0))
     }
 
     /// Pushes lid vertices out of the eyeball.
     fn keep_clear(&self, deltas: &mut [Vector]) {
-        for &(vertex, _, _) in &self.around {
-            let rest = self.rest[vertex as usize] - self.center;
+        for (vertex, _) in self.reached() {
+            let rest = self.rest[vertex] - self.center;
             let clearance = (rest.norm() - self.radius).min(self.recipe.clearance);
-            let now = rest + deltas[vertex as usize];
+            let now = rest + deltas[vertex];
             let distance = now.norm();
             let least = self.radius + clearance;
-            if distance > 0.0 && distance < least && rest.z > 0.0 {
-                deltas[vertex as usize] += now * (least / distance - 1.0);
+            if distance > 0.0 && distance < least {
+                deltas[vertex] += now * (least / distance - 1.0);
             }
         }
     }
 }
 
-fn around(
-    recipe: &LidRecipe,
-    rest: &[Point],
-    upper: &[u32],
-    lower: &[u32],
-    margin: &BTreeMap<u32, (u32, bool)>,
-) -> Vec<(u32, bool, f64)> {
-    let distance_to = |chain: &[u32], p: &Point| {
-        chain
-            .iter()
-            .map(|&v| (rest[v as usize] - p).norm())
-            .fold(f64::INFINITY, f64::min)
-    };
-    (0u32..)
-        .zip(rest)
-        .filter_map(|(vertex, p)| {
-            let (to_upper, to_lower) = (distance_to(upper, p), distance_to(lower, p));
-            let nearest = to_upper.min(to_lower);
-            if nearest > recipe.reach {
-                return None;
-            }
-            let is_upper = match margin.get(&vertex) {
-                Some(&(_, is_upper)) => is_upper,
-                None => to_upper < to_lower,
-            };
-            // Fades to nothing at the reach with no slope at either end, and towards the
-            // corners where the other lid is as near.
-            let t = 1.0 - nearest / recipe.reach;
-            let fade = t * t * (3.0 - 2.0 * t);
-            Some((vertex, is_upper, fade))
-        })
-        .collect()
-}
-
-/// Mean of values weighted by nearness to `p`.
-fn nearby_mean(values: &[(Point, Vector)], p: &Point, blur: f64) -> Vector {
-    let mut sum = Vector::zeros();
-    let mut total = 0.0;
-    let nearest = values
-        .iter()
-        .map(|(q, _)| (q - p).norm_squared())
-        .fold(f64::INFINITY, f64::min);
-    for (q, value) in values {
-        let weight = (-((q - p).norm_squared() - nearest) / (2.0 * blur * blur)).exp();
-        sum += weight * value;
-        total += weight;
-    }
-    if total > 0.0 { sum / total } else { sum }
-}
-
-/// The point of a curve sorted by x at one x; `None` outside its ends.
-fn at_x(curve: &[Point], x: f64) -> Option<Point> {
-    curve.windows(2).find_map(|pair| {
-        let (a, b) = (pair[0], pair[1]);
-        if x < a.x || x > b.x || a.x == b.x {
-            return None;
+/// How far along a chain of vertices the point of it nearest to `p` lies, 0 to 1.
+fn along(rest: &[Point], chain: &[u32], p: &Point) -> f64 {
+    let mut length = 0.0;
+    let mut best = (f64::INFINITY, 0.0);
+    for pair in chain.windows(2) {
+        let (a, b) = (rest[pair[0] as usize], rest[pair[1] as usize]);
+        let edge = b - a;
+        let t = (edge.dot(&(p - a)) / edge.norm_squared()).clamp(0.0, 1.0);
+        let distance = (a + t * edge - p).norm();
+        if distance < best.0 {
+            best = (distance, length + t * edge.norm());
         }
-        Some(a + (b - a) * ((x - a.x) / (b.x - a.x)))
-    })
+        length += edge.norm();
+    }
+    if length > 0.0 { best.1 / length } else { 0.0 }
 }

@@ -8,16 +8,19 @@
 //! 2. crop at the edge loop around the neck; mirrored quads get mirrored corner orders;
 //! 3. eyeballs, teeth, tongue; a sphere fitted to each eyeball, a hinge to the lower teeth;
 //! 4. landmarks from the recipe, regions by outline and flood fill;
-//! 5. shapes: left and right averaged into exact mirrors, then corrected at the lids (they keep
-//!    their distance from the eyeball, blinks close) and at the lips (they do not pass through
-//!    each other).
+//! 5. shapes: left and right averaged into exact mirrors, then corrected: dents and ridges
+//!    smoothed, lids kept outside the eyeball and closed in blinks, lips sealed or opened and
+//!    kept out of each other, each half kept to its own side.
 //!
 //! [`FaceList`] makes faces of other people from the same source: remeshed for tests and for the
 //! demo, and in the template's topology as the truth that registration is measured against.
 
+mod aperture;
+mod corrections;
 mod crop;
 mod decimate;
 mod face;
+mod fairing;
 mod identity;
 mod lids;
 mod linings;
@@ -25,6 +28,7 @@ mod lips;
 mod pack;
 mod regions;
 mod rigid;
+mod sides;
 mod source;
 mod subdivide;
 

@@ -1,14 +1,19 @@
 //! The build itself, step after step.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::aperture::Aperture;
+use super::corrections::{Corrections, Hold};
 use super::crop::{Head, crop_head};
+use super::fairing::Fairing;
 use super::identity::{dense, identity, symmetric_left, symmetrize};
 use super::lids::Lids;
 use super::linings::Linings;
 use super::lips::{LipVertices, Lips};
 use super::regions::{EdgeGraph, paint_regions};
 use super::rigid::{PARTS, Part, fit_hinge, fit_sphere, mean, part};
+use super::sides::Sides;
 use super::source::{BaseMesh, read_face_target};
 use crate::atomic_file::write_atomically;
 use crate::mesh::Polygons;
@@ -120,22 +125,42 @@ pub fn build_geometry(
             what: "the lips".to_owned(),
             name: "lip_corner_l".to_owned(),
         })?;
-    let lips = Lips::new(
-        &recipe.lips,
-        &positions,
-        &head.mirror,
-        &Polygons::from_faces(&head.faces).triangles(),
-        &LipVertices {
-            region_of: &|v| &region_names[labels[v as usize] as usize].name,
-            back: positions[corner as usize].z - recipe.lips.lining,
+    let region_of = |v: u32| region_names[labels[v as usize] as usize].name.as_str();
+    let triangles = Polygons::from_faces(&head.faces).triangles();
+    let corrections = Corrections {
+        recipe,
+        rest: &positions,
+        triangles: &triangles,
+        fairing: Fairing::new(&positions, &triangles),
+        sides: Sides {
+            rest: &positions,
+            mirror: &head.mirror,
+            blend: recipe.side_blend,
         },
-    );
-    let linings = Linings::new(&recipe.linings, &positions, &|v| {
-        &region_names[labels[v as usize] as usize].name
-    });
-    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &lids, &lips, &linings)?;
+        lids,
+        linings: Linings::new(&recipe.linings, &positions, &region_of),
+        aperture: Aperture::new(
+            &recipe.aperture,
+            &positions,
+            &triangles,
+            &graph,
+            &landmarks,
+            &region_of,
+        )?,
+        lips: Lips::new(
+            &recipe.lips,
+            &positions,
+            &triangles,
+            &LipVertices {
+                region_of: &region_of,
+                back: positions[corner as usize].z - recipe.lips.lining,
+            },
+        ),
+        hold: Hold::new(&positions, &region_of),
+    };
+    let (stored_shapes, amplitudes) = stored_shapes(&shapes, &head, &corrections)?;
     let geometry = StoredGeometry {
-        vertex_regions: labels,
+        vertex_regions: labels.clone(),
         skin,
         mirror: head.mirror.clone(),
         parts: PARTS
@@ -222,10 +247,9 @@ type NamedShapes = (Vec<(String, StoredShape)>, Vec<(String, f64)>);
 fn stored_shapes(
     shapes: &Shapes<'_>,
     head: &Head,
-    lids: &Lids<'_>,
-    lips: &Lips<'_>,
-    linings: &Linings<'_>,
+    corrections: &Corrections<'_>,
 ) -> Result<NamedShapes, TemplateError> {
+    let mut done: BTreeMap<String, Vec<Vector>> = BTreeMap::new();
     let mut stored: Vec<(String, StoredShape)> = Vec::new();
     let mut amplitudes: Vec<(String, f64)> = Vec::new();
     for name in &shapes.recipe.shapes {
@@ -234,16 +258,12 @@ fn stored_shapes(
         let (shape, amplitude) = match partner {
             Some(other) => (StoredShape::MirrorOf(other as u32), amplitudes[other].1),
             None => {
-                let mut deltas = take(&shapes.symmetric(name)?, &head.source);
-                lids.correct(name, &mut deltas);
-                let over = match shapes.recipe.lips.over.get(name) {
-                    Some(other) => Some(take(&shapes.symmetric(other)?, &head.source)),
-                    None => None,
-                };
-                lips.correct(&mut deltas, over.as_deref());
-                linings.correct(name, &mut deltas);
+                let drawn = take(&shapes.symmetric(name)?, &head.source);
+                let deltas = corrections.correct(name, drawn, &done);
                 let amplitude = deltas.iter().map(|d| d.norm()).fold(0.0, f64::max);
-                (StoredShape::Deltas(sparse(&deltas)), amplitude)
+                let shape = StoredShape::Deltas(sparse(&deltas));
+                done.insert(name.clone(), deltas);
+                (shape, amplitude)
             }
         };
         stored.push((name.clone(), shape));
