@@ -412,7 +412,7 @@ fn lids_meet_on_one_line_outside_the_eyeball() {
         let gap = edges
             .iter()
             .filter(|e| e.iter().all(|&v| region(v) == "lower_lid_l"))
-            .map(|e| e.map(|v| seen(v)))
+            .map(|e| e.map(seen))
             .map(|[a, b]| (closest_on_triangle(&p, [a, b, b]).0 - p).norm())
             .fold(f64::INFINITY, f64::min);
         assert!(
