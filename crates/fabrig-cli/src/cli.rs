@@ -296,11 +296,17 @@ pub(crate) struct InfoArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum TemplateCommand {
-    /// Build `geometry.bin` of a pack from its source data
+    /// Build `geometry.bin` of a pack from its source data, and fit its skin weights
     Build {
         /// The `data` folder of the source
         data: PathBuf,
         /// The pack, with its `template.toml`
+        #[arg(default_value = "templates/human")]
+        folder: PathBuf,
+    },
+    /// Fit the skin weights of a pack and store them in it as `skin_weights.bin`
+    Fit {
+        /// The pack
         #[arg(default_value = "templates/human")]
         folder: PathBuf,
     },

@@ -219,6 +219,7 @@ fn damaged_packs_are_refused() -> Result<(), Box<dyn std::error::Error>> {
             patch_layout: "",
             action_units: "",
             materials: "",
+            skin_weights: &[],
         })
     };
     assert!(load(&description, &geometry).is_ok());

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, ensure};
 use fabrig_core::anatomy::{self, Resolution};
 use fabrig_core::cloth::Materials;
 use fabrig_core::facs::{ActionUnitMap, ActionUnitTable};
+use fabrig_core::rig::write_template_weights;
 use fabrig_core::template::{self, Template};
 
 use super::Outcome;
@@ -15,6 +16,7 @@ use crate::console::Console;
 pub(crate) fn run(console: &Console, command: &TemplateCommand) -> Result<Outcome> {
     match command {
         TemplateCommand::Build { data, folder } => build(console, data, folder),
+        TemplateCommand::Fit { folder } => fit(console, folder),
         TemplateCommand::Check { folder } => match folder {
             Some(folder) => check(console, &Template::load(folder)?),
             None => check(console, template::human()),
@@ -31,6 +33,13 @@ fn build(console: &Console, data: &Path, folder: &Path) -> Result<Outcome> {
     for (shape, amplitude) in &report.amplitudes {
         console.result(&format!("{shape:<24}{amplitude:>8.2} mm"));
     }
+    fit(console, folder)
+}
+
+/// Fits the skin weights that every face inherits and stores them in the pack.
+fn fit(console: &Console, folder: &Path) -> Result<Outcome> {
+    let byte_count = write_template_weights(&Template::load(folder)?, folder)?;
+    console.result(&format!("skin weights: {byte_count} bytes"));
     Ok(Outcome::Done)
 }
 

@@ -66,6 +66,12 @@ pub fn rig_face(
     let mut rig = build(&on_template, template, &options.rig)?;
     name_parts_by_groups(&mut rig);
     let mut report = registration.report;
+    for shape in rig.dead_shapes() {
+        report.warnings.push(match shape {
+            "tongueOut" => "the mesh has no tongue: tongueOut moves nothing".to_owned(),
+            other => format!("{other} moves nothing on this face"),
+        });
+    }
     report.times.push(StageTime {
         stage: "build".to_owned(),
         seconds: clock.elapsed().as_secs_f64(),

@@ -1,24 +1,22 @@
 //! From a face on the template to a rig.
 
-use nalgebra::Similarity3;
-use rayon::prelude::*;
-
 use crate::anatomy::{self, Patch, Resolution};
 use crate::mesh::{Mesh, SurfacePoint};
 use crate::registration::{Registration, RigidComponent};
+use crate::rig::close_lids::close_lids;
 use crate::rig::parts::name_parts;
 use crate::rig::sockets::{fit_eyes, fit_hinge};
+use crate::rig::template_side::TemplateSide;
+use crate::rig::tongue::give_shapes;
 use crate::rig::{Rig, RigError, RigJaw, RigPatch};
-use crate::skin::{
-    CandidateFinder, FitOptions, NodeAffine, NodeFrames, Pose, SkinBinding, SmoothInterpolation,
-    TemplateWeights, fit_to_shapes,
-};
-use crate::template::{EyeSocket, JawHinge, Template};
+use crate::skin::{FitOptions, SkinBinding, SmoothInterpolation};
+use crate::template::{EyeSocket, Template};
 use crate::transfer::{
     AlphaField, EyeShapes, JawField, JawMode, JawShapes, LidClosing, LidField, MuscleShape,
-    PatchTransfer, ShapeSampler, ShapeWeights, muscle_shapes, size_ratio, smoothed_normals,
+    PatchTransfer, ShapeSampler, size_ratio,
 };
 use crate::{Point, Vector};
+use nalgebra::Similarity3;
 
 /// How a rig is built.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,35 +114,24 @@ pub fn build(
             found: places.len(),
         });
     }
-    let charts = anatomy::charts(template, options.resolution)?;
-    let template_patches = anatomy::lay_patches(template, &charts, template.skin.positions())?;
-    let patches = anatomy::lay_patches(template, &charts, positions)?;
-    let shapes = muscle_shapes(template, &charts, options.threshold)?;
+    let side = TemplateSide::of(template, options)?;
+    let patches = anatomy::lay_patches(template, &side.charts, positions)?;
 
     let (hinge, jaw_scale) = fit_hinge(template, positions);
     let mut eyes = fit_eyes(template, positions);
     let in_head: Vec<Point> = face.positions().iter().map(|p| to_head * p).collect();
-    let parts = name_parts(rigid, &in_head, &mut eyes);
+    let mut parts = name_parts(rigid, &in_head, &mut eyes);
+    give_shapes(template, positions, &in_head, &mut parts);
 
     let jaw_shapes = JawShapes::of(template);
-    let on_self = transfer_all(
-        template,
-        &template_patches,
-        &template_patches,
-        template.skin.positions(),
-        shapes.clone(),
-        &template.eyes,
-    );
     let transfers = transfer_all(
         template,
-        &template_patches,
+        &side.patches,
         &patches,
         positions,
-        shapes,
+        side.shapes.clone(),
         &eyes,
     );
-
-    let weights = fit_weights(template, &template_patches, &on_self, options);
     let is_rigid = rigid_mask(face.vertex_count(), &parts);
     let skin_places: Vec<Option<SurfacePoint>> = places
         .iter()
@@ -153,13 +140,13 @@ pub fn build(
         .collect();
     let node_counts = patches.iter().map(|p| p.neutral.len() as u32).collect();
     let binding = SkinBinding::bind(
-        &weights,
+        &side.weights,
         &SmoothInterpolation::new(template),
         &skin_places,
         node_counts,
     )?;
 
-    Ok(Rig {
+    let mut rig = Rig {
         template: template.name.clone(),
         template_version: template.version,
         shape_names: template.shapes.iter().map(|s| s.name.clone()).collect(),
@@ -183,24 +170,9 @@ pub fn build(
         parts,
         materials: template.materials.clone(),
         registration_report: report.clone(),
-    })
-}
-
-/// Fits the skin weights of the template itself, which every face inherits.
-///
-/// # Errors
-///
-/// [`RigError`] where the template's layout cannot be laid.
-pub fn template_weights(
-    template: &Template,
-    options: &RigOptions,
-) -> Result<TemplateWeights, RigError> {
-    let charts = anatomy::charts(template, options.resolution)?;
-    let rest = template.skin.positions();
-    let patches = anatomy::lay_patches(template, &charts, rest)?;
-    let shapes = muscle_shapes(template, &charts, options.threshold)?;
-    let transfers = transfer_all(template, &patches, &patches, rest, shapes, &template.eyes);
-    Ok(fit_weights(template, &patches, &transfers, options))
+    };
+    close_lids(&mut rig, template, &skin_places);
+    Ok(rig)
 }
 
 /// Places of a template's own skin vertices on itself: registration that is exact.
@@ -232,7 +204,7 @@ pub fn places_of_self(template: &Template) -> Vec<SurfacePoint> {
 }
 
 /// Puts the muscle shapes of every patch on a face.
-fn transfer_all(
+pub(super) fn transfer_all(
     template: &Template,
     template_patches: &[Patch],
     patches: &[Patch],
@@ -305,87 +277,6 @@ fn transfer_all(
             }
         })
         .collect()
-}
-
-/// Poses the template's own patches in each of its shapes and fits the skin to that.
-fn fit_weights(
-    template: &Template,
-    patches: &[Patch],
-    transfers: &[PatchTransfer],
-    options: &RigOptions,
-) -> TemplateWeights {
-    let triangles = template.skin.triangles();
-    let normals = smoothed_normals(template.skin.positions(), &triangles, 0);
-    let finder = CandidateFinder::new(template, &triangles, &normals, patches, &options.fit);
-    let poser = TemplatePoser {
-        template,
-        transfers,
-        jaw_shapes: JawShapes::of(template),
-        jaw_mode: options.jaw_mode,
-        frames: patches
-            .iter()
-            .map(|p| {
-                let rest = p.neutral.iter().map(|q| q.cast()).collect();
-                NodeFrames::new(p.chart.grid, rest)
-            })
-            .collect(),
-    };
-    let poses: Vec<Pose> = (0..template.shapes.len())
-        .into_par_iter()
-        .map(|s| poser.pose(s))
-        .collect();
-    fit_to_shapes(template, &normals, &finder, &poses, &options.fit)
-}
-
-struct TemplatePoser<'a> {
-    template: &'a Template,
-    transfers: &'a [PatchTransfer],
-    jaw_shapes: JawShapes,
-    jaw_mode: JawMode,
-    frames: Vec<NodeFrames>,
-}
-
-impl TemplatePoser<'_> {
-    /// One shape at weight 1: what every node and the mandible do, and what the skin does.
-    fn pose(&self, shape: usize) -> Pose {
-        let mut weights = vec![0.0; self.template.shapes.len()];
-        weights[shape] = 1.0;
-        let hinge: &JawHinge = &self.template.jaw;
-        let context = crate::transfer::TransferContext {
-            hinge,
-            jaw_shapes: &self.jaw_shapes,
-            jaw_mode: self.jaw_mode,
-            eyes: &self.template.eyes,
-        };
-        let mut affines = Vec::new();
-        for (transfer, frames) in self.transfers.iter().zip(&self.frames) {
-            let rest = frames.rest();
-            let mut now = rest.to_vec();
-            let mut velocities = vec![nalgebra::Vector3::zeros(); rest.len()];
-            let at = ShapeWeights {
-                weights: &weights,
-                rates: None,
-            };
-            transfer.evaluate(&context, rest, at, &mut now, &mut velocities);
-            let start = affines.len();
-            affines.resize(start + rest.len(), NodeAffine::identity());
-            frames.affines(&now, &mut affines[start..]);
-        }
-        let pose = crate::transfer::JawPose::at(hinge, &self.jaw_shapes, 1.0, &weights);
-        let (rotation, shift) = pose.affine(hinge);
-        affines.push(NodeAffine {
-            turn: (rotation - nalgebra::Matrix3::identity()).cast(),
-            shift: shift.cast(),
-        });
-        let mut displacements = vec![nalgebra::Vector3::zeros(); self.template.skin.vertex_count()];
-        for &(vertex, delta) in &self.template.shapes[shape].deltas {
-            displacements[vertex as usize] = delta.cast();
-        }
-        Pose {
-            affines,
-            displacements,
-        }
-    }
 }
 
 fn rigid_mask(vertex_count: usize, parts: &[crate::rig::RigPart]) -> Vec<bool> {

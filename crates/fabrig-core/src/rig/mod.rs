@@ -4,15 +4,20 @@
 //! knows nothing of time. [`Rig::targets`] evaluates Eq. 3 for all patches.
 
 mod assemble;
+mod close_lids;
 mod error;
 mod file;
 mod parts;
 mod sockets;
+mod template_side;
+mod tongue;
 
-pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self, template_weights};
+pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self};
 pub use error::RigError;
 pub use file::FORMAT_VERSION;
 pub use parts::RigPart;
+pub use template_side::{fit_template_weights, stored_template_weights, write_template_weights};
+pub use tongue::PartShape;
 
 use nalgebra::{Point3, Similarity3, Vector3};
 use rayon::prelude::*;
@@ -90,6 +95,25 @@ impl Rig {
     /// Index of a shape in lists of weights.
     pub fn shape_index(&self, name: &str) -> Option<usize> {
         self.shape_names.iter().position(|n| n == name)
+    }
+
+    /// Shapes that move nothing on this face, such as `tongueOut` where the mesh has no tongue.
+    pub fn dead_shapes(&self) -> Vec<&str> {
+        let is_of_eye = |shape: u32| {
+            let looks = self.eye_shapes.iter().flat_map(|eye| eye.look);
+            looks.flatten().any(|s| s == shape)
+        };
+        let moves = |shape: u32| {
+            let of_patches = self.patches.iter().flat_map(|p| &p.transfer.shapes);
+            let of_parts = self.parts.iter().flat_map(|p| &p.shapes);
+            of_patches.map(|s| s.shape).any(|s| s == shape)
+                || of_parts.map(|s| s.shape).any(|s| s == shape)
+        };
+        let names = self.shape_names.iter().enumerate();
+        names
+            .filter(|(shape, _)| !is_of_eye(*shape as u32) && !moves(*shape as u32))
+            .map(|(_, name)| name.as_str())
+            .collect()
     }
 
     /// Grid and neutral nodes of every patch. [mm, head frame]

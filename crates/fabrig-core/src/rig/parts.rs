@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::registration::RigidComponent;
+use crate::rig::PartShape;
 use crate::template::{EyeSocket, RigidBody};
 use crate::{Point, Vector};
 
@@ -10,12 +11,14 @@ use crate::{Point, Vector};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigPart {
     /// `eye_l`, `eye_r`, `upper_rigid` (moves with the skull), `lower_rigid` (with the
-    /// mandible); numbered from the second on.
+    /// mandible), `tongue`; numbered from the second on.
     pub name: String,
     /// What it moves with.
     pub follows: RigidBody,
     /// Its vertices in the user's mesh, rising.
     pub vertices: Vec<u32>,
+    /// What shapes do to it besides: a tongue that comes out.
+    pub shapes: Vec<PartShape>,
 }
 
 /// Names the pieces that registration found, and puts the sockets where the eyeballs are.
@@ -44,6 +47,7 @@ pub(super) fn name_parts(
             },
             follows: component.body,
             vertices: component.vertices.clone(),
+            shapes: Vec::new(),
         });
     }
     for (eye, body) in [RigidBody::EyeLeft, RigidBody::EyeRight]

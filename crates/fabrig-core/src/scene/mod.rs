@@ -1,5 +1,6 @@
 //! Scenes: what to model around a rig, and stepping it through a take.
 
+mod anchors;
 mod chain_loss;
 mod description;
 mod error;

@@ -12,6 +12,7 @@ use crate::cloth::{
 };
 use crate::motion::{Clip, EyeAngles, Sample};
 use crate::rig::{NodeTargets, Rig};
+use crate::scene::anchors::{BoneAnchors, Mandible};
 use crate::scene::head::{head_motion, head_to_world};
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
@@ -95,7 +96,7 @@ pub struct Simulation {
     evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
-    anchor_nodes: Vec<Vec<u32>>,
+    anchored: Vec<BoneAnchors>,
     deformer: SkinDeformer,
     skin: Vec<Point3<f32>>,
 }
@@ -113,22 +114,12 @@ impl Simulation {
             .map_or_else(|| vec![None; names.len()], |c| c.channel_indices(&names));
         let materials = Materials::parse(&rig.materials)?;
         let mut patches = Vec::with_capacity(rig.patches.len());
-        let mut anchor_nodes = Vec::with_capacity(rig.patches.len());
+        let mut anchored = Vec::with_capacity(rig.patches.len());
         for patch in &rig.patches {
             let chart = &patch.patch.chart;
             let attachments: Vec<ClothAttachment> =
                 chart.attachments.iter().map(to_cloth_attachment).collect();
-            anchor_nodes.push(
-                attachments
-                    .iter()
-                    .filter_map(|a| match a {
-                        ClothAttachment::Anchors { nodes, .. } => Some(nodes),
-                        ClothAttachment::Patch { .. } => None,
-                    })
-                    .flatten()
-                    .copied()
-                    .collect::<Vec<u32>>(),
-            );
+            anchored.push(BoneAnchors::new(&rig, patch));
             patches.push(ClothPatch {
                 shape: chart.grid,
                 rest: patch.patch.neutral.iter().map(|q| q.cast()).collect(),
@@ -156,7 +147,7 @@ impl Simulation {
             evaluated: vec![(Vec::new(), Vec::new()); count],
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
-            anchor_nodes,
+            anchored,
             deformer,
             skin,
         };
@@ -383,20 +374,10 @@ impl Simulation {
             std::mem::swap(&mut target.positions, positions);
             std::mem::swap(&mut target.velocities, velocities);
         }
-        for ((anchors, target), nodes) in self
-            .anchors
-            .iter_mut()
-            .zip(&self.targets)
-            .zip(&self.anchor_nodes)
-        {
-            // Bone holds a node where the muscle shapes put it: the shapes are the artist's
-            // word, the bone keeps the node from swinging.
-            anchors.positions.clear();
-            anchors.velocities.clear();
-            for &node in nodes {
-                anchors.positions.push(target.positions[node as usize]);
-                anchors.velocities.push(target.velocities[node as usize]);
-            }
+        let mandible = Mandible::at(&self.rig, &self.pose.weights, &self.pose.rates);
+        let held = self.anchored.iter().zip(&self.targets);
+        for ((anchored, target), anchors) in held.zip(&mut self.anchors) {
+            anchored.place(&mandible, target, anchors);
         }
         Ok(())
     }
@@ -412,13 +393,20 @@ impl Simulation {
         self.deformer
             .deform(&self.rig.binding, &nodes, mandible, &mut self.skin)?;
         for part in self.parts() {
+            let piece = &self.rig.parts[part.part];
+            let weight = |shape: u32| self.pose.weights[shape as usize];
+            for shape in piece.shapes.iter().filter(|s| weight(s.shape) != 0.0) {
+                for (&vertex, delta) in piece.vertices.iter().zip(&shape.deltas) {
+                    self.skin[vertex as usize] += delta * weight(shape.shape);
+                }
+            }
             if part.motion == Isometry3::identity() {
                 continue;
             }
             let motion = part.motion.cast::<f32>();
-            for &vertex in &self.rig.parts[part.part].vertices {
+            for &vertex in &piece.vertices {
                 let v = vertex as usize;
-                self.skin[v] = motion * self.deformer.rest()[v];
+                self.skin[v] = motion * self.skin[v];
             }
         }
         Ok(())

@@ -125,7 +125,7 @@ impl<'a> CandidateFinder<'a> {
         })
     }
 
-    fn is_cavity(&self, region: RegionId) -> bool {
+    pub(super) fn is_cavity(&self, region: RegionId) -> bool {
         let name = &self.template.regions.regions[region.0 as usize].name;
         CAVITIES.iter().any(|cavity| name.starts_with(cavity))
     }

@@ -4,24 +4,32 @@
 //! its corner, a lid the cheek. Here the weights of each template vertex minimise, over all
 //! poses i (each shape at weight 1),
 //!
-//! `sum_i |sum_j w_j g_ij - d_i|^2 + ridge |w - w_prior|^2`, `w >= 0`, `sum w <= 1`
+//! `sum_i c_i |sum_j w_j g_ij - d_i|^2 + ridge |w - w_prior|^2`, `w >= 0`, `sum w <= 1`
 //!
-//! where `g_ij` is what node j alone would do to the vertex in pose i and `d_i` is what the
-//! shape does to it. The prior is the kernel at first, and then the mean of the weights of
-//! the neighbours, which keeps weights smooth where the shapes do not tell nodes apart.
-//! The skull takes what is missing to one.
+//! where `g_ij` is what node j alone would do to the vertex in pose i, `d_i` is what the shape
+//! does to it, and `c_i` is larger where that is nothing, since skin that drifts is seen
+//! sooner than skin that lags. The prior is the kernel at first, and then the mean of the
+//! weights of the neighbours, which keeps weights smooth where the shapes do not tell nodes
+//! apart. The skull takes what is missing to one.
+//!
+//! Inner skin (the lining of mouth and sockets) lies under the patches, outside the hull of
+//! their nodes: what it does is found by going on inwards from what they do, and that is a
+//! difference of nodes. Its weights may have either sign, each at a price that keeps them few.
+//!
+//! Left and right are fitted once and mirrored.
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::Vector;
+use crate::anatomy::PatchChart;
 use crate::mesh::Topology;
-use crate::skin::nonnegative::solve_nonnegative;
-use crate::skin::{Candidate, CandidateFinder, NodeAffine, kernel};
+use crate::skin::vertex_fit::Choice;
+use crate::skin::{Candidate, CandidateFinder, NodeAffine, NodeMirror};
 use crate::template::Template;
 
 /// How weights are fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct FitOptions {
     /// No node further away is taken; the kernel ends here. (mm)
     pub reach: f64,
@@ -33,8 +41,14 @@ pub struct FitOptions {
     pub candidate_limit: usize,
     /// Nodes a vertex keeps in the end.
     pub node_limit: usize,
+    /// Nodes a vertex of inner skin keeps in the end.
+    pub inner_node_limit: usize,
     /// Pull towards the prior, as a mean squared motion over all poses. [mm^2]
     pub ridge: f64,
+    /// Price of a weight of inner skin, against squared motion summed over all poses. [mm^2]
+    pub inner_price: f64,
+    /// How many times a pose counts for a vertex that it leaves still.
+    pub still_factor: f64,
     /// Rounds with the neighbours' mean as prior, after the one with the kernel.
     pub smoothing_rounds: usize,
 }
@@ -47,7 +61,10 @@ impl Default for FitOptions {
             rings: 2,
             candidate_limit: 64,
             node_limit: 24,
+            inner_node_limit: 48,
             ridge: 0.3,
+            inner_price: 0.6,
+            still_factor: 4.0,
             smoothing_rounds: 2,
         }
     }
@@ -70,12 +87,15 @@ pub struct TemplateWeights {
 
 /// Fits the weights of every vertex of the template.
 ///
+/// - `charts`: the patches that `finder` knows
 /// - `normals`: vertex normals of the template's neutral skin
 /// - `poses`: the motions to reproduce
 ///
-/// The result does not depend on the number of threads.
+/// Weights are whole steps of [`TemplateWeights::STEP`]. The result does not depend on the
+/// number of threads.
 pub fn fit_to_shapes(
     template: &Template,
+    charts: &[PatchChart],
     normals: &[Vector],
     finder: &CandidateFinder<'_>,
     poses: &[Pose],
@@ -83,132 +103,57 @@ pub fn fit_to_shapes(
 ) -> TemplateWeights {
     let mandible = finder.node_count() as u32;
     let positions = template.skin.positions();
-    let problems: Vec<Problem> = (0..positions.len())
+    let mirror = NodeMirror::new(charts);
+    let choices: Vec<(usize, Choice)> = template
+        .one_half()
         .into_par_iter()
         .map(|v| {
-            let mut candidates = finder.find(v, &normals[v]);
-            let distances: Vec<f64> = candidates.iter().map(|c| c.distance).collect();
-            let mut prior = kernel::weights(&distances, options.reach);
-            candidates.push(Candidate {
-                node: mandible,
-                distance: 0.0,
-            });
-            prior.push(0.0);
-            Problem::new(&positions[v].cast(), v, candidates, prior, poses)
+            let is_inner = finder.is_cavity(template.regions.vertex_regions[v]);
+            let candidates = finder.find(v, &normals[v]);
+            let point = positions[v].cast();
+            let choice = Choice::new(v, point, candidates, mandible, is_inner, options);
+            (v, choice)
         })
         .collect();
-    let mut weights: Vec<Vec<(u32, f32)>> = problems
+    let on_both_sides = |half: Vec<Vec<(u32, f32)>>| {
+        let mut weights = vec![Vec::new(); positions.len()];
+        for ((v, _), row) in choices.iter().zip(half) {
+            weights[template.mirror[*v] as usize] = mirror.row(&row);
+            weights[*v] = row;
+        }
+        weights
+    };
+    let half = choices
         .par_iter()
-        .map(|p| p.solve(&p.prior, options.ridge, &[]))
+        .map(|(_, c)| c.fit(poses, &c.prior, &[], options))
         .collect();
+    let mut weights = on_both_sides(half);
     let topology = Topology::from_mesh(&template.skin);
     for _ in 0..options.smoothing_rounds {
-        weights = problems
+        let half = choices
             .par_iter()
-            .enumerate()
-            .map(|(v, problem)| {
-                let prior = neighbour_mean(template, &topology, v, problem, &weights);
-                problem.solve(&prior, options.ridge, &weights[v])
+            .map(|(v, choice)| {
+                let prior = neighbour_mean(template, &topology, *v, &choice.candidates, &weights);
+                choice.fit(poses, &prior, &weights[*v], options)
             })
             .collect();
+        weights = on_both_sides(half);
     }
-    for vertex in &mut weights {
-        keep_largest(vertex, options.node_limit);
+    let half = choices
+        .iter()
+        .map(|(v, choice)| {
+            let mut row = std::mem::take(&mut weights[*v]);
+            choice.keep_largest(&mut row, options);
+            if template.mirror[*v] as usize == *v {
+                row = mirror.symmetric_row(&row);
+            }
+            row
+        })
+        .collect();
+    TemplateWeights {
+        by_vertex: on_both_sides(half),
     }
-    TemplateWeights { by_vertex: weights }
-}
-
-/// The least squares of one vertex.
-struct Problem {
-    candidates: Vec<Candidate>,
-    prior: Vec<f64>,
-    normal: DMatrix<f64>,
-    rhs: DVector<f64>,
-}
-
-impl Problem {
-    fn new(
-        point: &Point3<f32>,
-        vertex: usize,
-        candidates: Vec<Candidate>,
-        prior: Vec<f64>,
-        poses: &[Pose],
-    ) -> Self {
-        let count = candidates.len();
-        let mut normal = DMatrix::zeros(count, count);
-        let mut rhs = DVector::zeros(count);
-        let mut motions = vec![Vector3::<f64>::zeros(); count];
-        for pose in poses {
-            let mut moves = false;
-            for (motion, candidate) in motions.iter_mut().zip(&candidates) {
-                let displacement = pose.affines[candidate.node as usize].displacement(point);
-                moves |= displacement.norm_squared() > 1e-10;
-                *motion = displacement.cast();
-            }
-            if !moves {
-                continue;
-            }
-            let wanted = pose.displacements[vertex].cast::<f64>();
-            for i in 0..count {
-                rhs[i] += motions[i].dot(&wanted);
-                for j in 0..=i {
-                    normal[(i, j)] += motions[i].dot(&motions[j]);
-                }
-            }
-        }
-        for i in 0..count {
-            for j in 0..i {
-                normal[(j, i)] = normal[(i, j)];
-            }
-        }
-        Self {
-            candidates,
-            prior,
-            normal,
-            rhs,
-        }
-    }
-
-    /// - `last`: the answer of the round before, to start from
-    fn solve(&self, prior: &[f64], ridge: f64, last: &[(u32, f32)]) -> Vec<(u32, f32)> {
-        let count = self.candidates.len();
-        let mut normal = self.normal.clone();
-        let mut rhs = self.rhs.clone();
-        for i in 0..count {
-            normal[(i, i)] += ridge;
-            rhs[i] += ridge * prior[i];
-        }
-        let mut start = DVector::zeros(count);
-        for &(node, weight) in last {
-            if let Ok(i) = self.candidates.binary_search_by_key(&node, |c| c.node) {
-                start[i] = f64::from(weight);
-            }
-        }
-        let mut weights = solve_nonnegative(&normal, &rhs, start);
-        let total = weights.sum();
-        if total > 1.0 {
-            // Hold the sum at one by a stiff row, then exactly by scaling.
-            let stiff = 1e3 * normal.diagonal().max().max(1.0);
-            for i in 0..count {
-                rhs[i] += stiff;
-                for j in 0..count {
-                    normal[(i, j)] += stiff;
-                }
-            }
-            let start = weights / total;
-            weights = solve_nonnegative(&normal, &rhs, start);
-            let total = weights.sum();
-            if total > 1.0 {
-                weights /= total;
-            }
-        }
-        self.candidates
-            .iter()
-            .zip(weights.iter())
-            .filter(|(_, w)| **w > 1e-4)
-            .map(|(c, w)| (c.node, *w as f32))
-            .collect()
-    }
+    .in_steps()
 }
 
 /// Mean of the neighbours' weights and the vertex's own, on the vertex's candidates.
@@ -216,12 +161,12 @@ fn neighbour_mean(
     template: &Template,
     topology: &Topology,
     vertex: usize,
-    problem: &Problem,
+    candidates: &[Candidate],
     weights: &[Vec<(u32, f32)>],
 ) -> Vec<f64> {
     let regions = &template.regions;
     let own = regions.vertex_regions[vertex];
-    let mut mean = vec![0.0; problem.candidates.len()];
+    let mut mean = vec![0.0; candidates.len()];
     let mut count = 0.0;
     let ring = topology
         .neighbours(vertex as u32)
@@ -231,26 +176,11 @@ fn neighbour_mean(
     for n in ring.chain([vertex]) {
         count += 1.0;
         for &(node, weight) in &weights[n] {
-            if let Ok(i) = problem.candidates.binary_search_by_key(&node, |c| c.node) {
+            if let Ok(i) = candidates.binary_search_by_key(&node, |c| c.node) {
                 mean[i] += f64::from(weight);
             }
         }
     }
     mean.iter_mut().for_each(|m| *m /= count);
     mean
-}
-
-/// Keeps the largest weights and hands what the others held to them.
-fn keep_largest(weights: &mut Vec<(u32, f32)>, limit: usize) {
-    if weights.len() <= limit {
-        return;
-    }
-    let before: f32 = weights.iter().map(|w| w.1).sum();
-    weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    weights.truncate(limit);
-    let after: f32 = weights.iter().map(|w| w.1).sum();
-    for weight in weights.iter_mut() {
-        weight.1 *= before / after;
-    }
-    weights.sort_by_key(|w| w.0);
 }

@@ -12,9 +12,10 @@
 //!
 //! # Limitations
 //!
-//! Weights are convex: a vertex outside the hull of the nodes near it follows them by their
-//! turn alone. Detail of a motion finer than the grid of the patch is lost.
+//! Weights of outer skin are convex: a vertex outside the hull of the nodes near it follows
+//! them by their turn alone. Detail of a motion finer than the grid of the patch is lost.
 
+mod active_set;
 mod binding;
 mod candidates;
 mod deform;
@@ -23,7 +24,9 @@ pub mod fit;
 mod frames;
 mod interpolation;
 pub mod kernel;
-mod nonnegative;
+mod mirror;
+mod stored;
+mod vertex_fit;
 
 pub use binding::SkinBinding;
 pub use candidates::{Candidate, CandidateFinder};
@@ -32,3 +35,4 @@ pub use error::SkinError;
 pub use fit::{FitOptions, Pose, TemplateWeights, fit_to_shapes};
 pub use frames::{NodeAffine, NodeFrames};
 pub use interpolation::SmoothInterpolation;
+pub use mirror::NodeMirror;

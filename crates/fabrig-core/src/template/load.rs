@@ -23,6 +23,8 @@ pub struct PackFiles<'a> {
     pub action_units: &'a str,
     /// `materials.toml`
     pub materials: &'a str,
+    /// `skin_weights.bin`; empty for a pack that has none
+    pub skin_weights: &'a [u8],
 }
 
 static HUMAN: LazyLock<Template> = LazyLock::new(|| {
@@ -32,6 +34,7 @@ static HUMAN: LazyLock<Template> = LazyLock::new(|| {
         patch_layout: include_str!("../../../../templates/human/patches.toml"),
         action_units: include_str!("../../../../templates/human/action_units.toml"),
         materials: include_str!("../../../../templates/human/materials.toml"),
+        skin_weights: include_bytes!("../../../../templates/human/skin_weights.bin"),
     };
     match Template::from_files(&files) {
         Ok(template) => template,
@@ -48,7 +51,7 @@ pub fn human() -> &'static Template {
 
 impl Template {
     /// Reads a pack from its folder (`template.toml`, `geometry.bin`, `patches.toml`,
-    /// `action_units.toml`, `materials.toml`).
+    /// `action_units.toml`, `materials.toml`, and `skin_weights.bin` where it has one).
     ///
     /// # Errors
     ///
@@ -68,6 +71,14 @@ impl Template {
             patch_layout: &text("patches.toml")?,
             action_units: &text("action_units.toml")?,
             materials: &text("materials.toml")?,
+            skin_weights: &match bytes("skin_weights.bin") {
+                Err(TemplateError::Read { source, .. })
+                    if source.kind() == std::io::ErrorKind::NotFound =>
+                {
+                    Vec::new()
+                }
+                other => other?,
+            },
         })
     }
 
@@ -123,6 +134,7 @@ fn assemble(
         patch_layout: files.patch_layout.to_owned(),
         action_units: files.action_units.to_owned(),
         materials: files.materials.to_owned(),
+        skin_weights: files.skin_weights.to_owned(),
     })
 }
 

@@ -152,6 +152,9 @@ pub struct Template {
     pub action_units: String,
     /// Text of `materials.toml`: cloth materials by name.
     pub materials: String,
+    /// Bytes of `skin_weights.bin`: skin weights fitted beforehand; empty where the pack has
+    /// none.
+    pub skin_weights: Vec<u8>,
 }
 
 impl Template {
@@ -160,6 +163,13 @@ impl Template {
         self.landmarks
             .get(name)
             .map(|&v| self.skin.positions()[v as usize])
+    }
+
+    /// One vertex of each mirrored pair, and those on the mid plane, rising.
+    pub fn one_half(&self) -> Vec<usize> {
+        (0..self.mirror.len())
+            .filter(|&v| v <= self.mirror[v] as usize)
+            .collect()
     }
 
     /// Index of the shape called `name`.

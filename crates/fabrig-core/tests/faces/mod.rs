@@ -55,6 +55,35 @@ impl RiggedFace {
     }
 }
 
+impl RiggedFace {
+    /// Whether a vertex belongs to an eyeball, teeth or tongue.
+    pub(crate) fn is_part(&self, vertex: u32) -> bool {
+        let mut parts = self.rig.parts.iter();
+        parts.any(|p| p.vertices.binary_search(&vertex).is_ok())
+    }
+
+    /// Whether the left and right of the registered face are mirror images to half a
+    /// millimetre, all but a hundredth of it.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        let template = template::human();
+        let positions = &self.registration.positions;
+        let apart = positions.iter().enumerate().filter(|(v, p)| {
+            let q = positions[template.mirror[*v] as usize];
+            let image = fabrig_core::Point::new(-q.x, q.y, q.z);
+            (image - **p).norm() > 0.5
+        });
+        apart.count() * 100 < positions.len()
+    }
+}
+
+static TEMPLATE: LazyLock<RiggedFace> =
+    LazyLock::new(|| RiggedFace::new("template", template::human().skin.clone()));
+
+/// The template's own skin as a user's face, through registration.
+pub(crate) fn template_face() -> &'static RiggedFace {
+    &TEMPLATE
+}
+
 static DEMO: LazyLock<RiggedFace> =
     LazyLock::new(|| RiggedFace::new("demo", template::demo_face()));
 
