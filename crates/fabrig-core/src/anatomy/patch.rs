@@ -158,7 +158,8 @@ impl Default for Resolution {
 /// Nodes of a patch that are held to something else (Eq. 5).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Attachment {
-    /// Nodes held to a rigid body where they lie at rest.
+    /// Nodes held to a rigid body where they lie at rest; those that the muscle shapes draw
+    /// along the bone are held where the shapes put them (told on each face by its scene).
     Body {
         /// The body.
         body: RigidBody,

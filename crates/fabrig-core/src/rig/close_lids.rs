@@ -21,8 +21,9 @@ use crate::transfer::ShapeWeights;
 const ROUNDS: usize = 4;
 /// Distance of the places where the margins are compared. (mm)
 const STEP: f64 = 0.5;
-/// How far the upper lid goes beyond the lower: what keeps a line from showing through. (mm)
-const OVERLAP: f64 = 0.2;
+/// How far the upper lid goes beyond the lower, least and most: a little keeps a line from
+/// showing through, and what the shapes draw within these bounds stays. (mm)
+const OVERLAP: [f64; 2] = [0.1, 0.5];
 /// A larger gap is no slit but lids that do not close, or margins that were not found. (mm)
 const LARGEST_GAP: f64 = 6.0;
 /// Width of the kernel that spreads a correction. (mm)
@@ -297,6 +298,7 @@ fn gaps(
         if gap.abs() > LARGEST_GAP {
             continue;
         }
+        let missing = gap - gap.clamp(-OVERLAP[1], -OVERLAP[0]);
         let amounts = [upper, lower].map(|e| (e.now - e.rest).norm());
         let share = amounts[0] / (amounts[0] + amounts[1]).max(f64::EPSILON);
         for (k, (edge, part)) in [(upper, -share), (lower, 1.0 - share)]
@@ -311,7 +313,7 @@ fn gaps(
             marks[k].push(Mark {
                 rest: edge.rest,
                 amount: amounts[k],
-                correction: up * (part * (gap + OVERLAP)),
+                correction: up * (part * missing),
             });
         }
     }
