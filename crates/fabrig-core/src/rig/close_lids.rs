@@ -23,7 +23,7 @@ const ROUNDS: usize = 4;
 const STEP: f64 = 0.5;
 /// How far the upper lid goes beyond the lower, least and most: a little keeps a line from
 /// showing through, and what the shapes draw within these bounds stays. (mm)
-const OVERLAP: [f64; 2] = [0.1, 0.5];
+const OVERLAP: [f64; 2] = [0.2, 0.5];
 /// A larger gap is no slit but lids that do not close, or margins that were not found. (mm)
 const LARGEST_GAP: f64 = 6.0;
 /// Width of the kernel that spreads a correction. (mm)
