@@ -157,6 +157,14 @@ pub(crate) fn from_triangles<'py>(
     Array2::from_shape_fn((triangles.len(), 3), |(i, corner)| triangles[i][corner]).into_pyarray(py)
 }
 
+/// A fresh (4, 4) array.
+pub(crate) fn from_matrix<'py>(
+    py: Python<'py>,
+    matrix: &nalgebra::Matrix4<f64>,
+) -> Bound<'py, PyArray2<f64>> {
+    Array2::from_shape_fn((4, 4), |(row, column)| matrix[(row, column)]).into_pyarray(py)
+}
+
 /// Anything serializable as Python dicts and lists.
 pub(crate) fn to_python<'py>(
     py: Python<'py>,

@@ -11,6 +11,7 @@ mod pipeline;
 mod progress;
 mod rig;
 mod simulation;
+mod template;
 
 use pyo3::prelude::*;
 
@@ -22,6 +23,8 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::PyRig>()?;
     m.add_class::<motion::PyClip>()?;
     m.add_class::<simulation::PySimulation>()?;
+    m.add_class::<template::PyTemplate>()?;
+    m.add_function(wrap_pyfunction!(template::template_pack, m)?)?;
     m.add_function(wrap_pyfunction!(mesh::read_mesh, m)?)?;
     m.add_function(wrap_pyfunction!(mesh::demo_face, m)?)?;
     m.add_function(wrap_pyfunction!(motion::read_motion, m)?)?;

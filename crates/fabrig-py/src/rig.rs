@@ -76,6 +76,12 @@ impl PyRig {
         self.inner.to_head.scaling()
     }
 
+    /// From the user's mesh to the head frame: a matrix [mm per unit], shape (4, 4).
+    #[getter]
+    fn to_head<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::from_matrix(py, &self.inner.to_head.to_homogeneous())
+    }
+
     /// What registration measured; empty for a rig that was made without it.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -92,3 +92,17 @@ def test_the_stub_names_what_the_module_has():
             if not member.startswith("_"):
                 assert re.search(rf"def {member}\(", stub), f"{kind.__name__}.{member}"
     assert extension.__version__ == fabrig.__version__
+
+
+def test_the_template_is_what_normalized_faces_are_in(rig):
+    template = fabrig.template()
+    vertices = template.mesh.vertices
+    assert vertices.shape == rig.normalized.shape
+    assert len(template.regions) == len(vertices)
+    left, right = (vertices[template.landmarks[f"lip_corner_{side}"]] for side in "lr")
+    assert left[0] > 0 > right[0]
+    scale = np.cbrt(np.linalg.det(rig.to_head[:3, :3]))
+    assert np.isclose(scale, rig.millimetres_per_unit)
+    placed = rig.mesh.vertices @ rig.to_head[:3, :3].T + rig.to_head[:3, 3]
+    tip = rig.normalized[template.landmarks["nose_tip"]]
+    assert np.linalg.norm(placed - tip, axis=1).min() < 3.0

@@ -19,6 +19,7 @@ from ._fabrig import (
     RigError,
     SceneError,
     Simulation,
+    Template,
     TemplateError,
     __version__,
     animate,
@@ -27,6 +28,7 @@ from ._fabrig import (
     read_mesh,
     read_motion,
     rig,
+    template,
 )
 
 __all__ = [
@@ -42,6 +44,7 @@ __all__ = [
     "RigError",
     "SceneError",
     "Simulation",
+    "Template",
     "TemplateError",
     "__version__",
     "animate",
@@ -50,4 +53,5 @@ __all__ = [
     "read_mesh",
     "read_motion",
     "rig",
+    "template",
 ]
