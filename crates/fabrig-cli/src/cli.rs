@@ -331,6 +331,48 @@ pub(crate) enum BenchCommand {
     /// How well faces of known truth are registered, or with `--cost` how long faces of growing
     /// size take to rig
     Registration(BenchRegistrationArgs),
+    /// The cloth solver's time beside its error: modes, substeps, sweeps, stiffness ratios
+    Pareto(BenchParetoArgs),
+    /// What a frame costs: faces simple and complex, with and without skin and recording, and
+    /// cloth from 2,000 to 200,000 nodes
+    Runtime(BenchRuntimeArgs),
+    /// The cloth solver's hard cases, each with its worst figure
+    Stability(BenchStabilityArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchParetoArgs {
+    /// The whole take and every setting, instead of its liveliest second and a half and the
+    /// settings about the default
+    #[arg(long)]
+    pub(crate) full: bool,
+    /// Also write one page with plots
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchRuntimeArgs {
+    /// Frames of each measurement
+    #[arg(long, default_value_t = 120, value_parser = clap::value_parser!(u32).range(10..=100_000))]
+    pub(crate) frames: u32,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchStabilityArgs {
+    /// A million frames at a held target and a thousand random scenes, instead of twenty
+    /// thousand and a hundred
+    #[arg(long)]
+    pub(crate) full: bool,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -4,7 +4,7 @@ use fabrig_core::Point;
 use fabrig_core::mesh::Polygons;
 use nalgebra::Point3;
 use numpy::ndarray::{Array2, ArrayView2};
-use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLike1, PyArrayLike2};
+use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayLike3};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
@@ -107,6 +107,53 @@ pub(crate) fn table(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(usize, us
     })?;
     let view = array.as_array();
     Ok((view.nrows(), view.ncols(), view.iter().copied().collect()))
+}
+
+/// A grid of vectors, row by row.
+pub(crate) struct Grid {
+    pub(crate) rows: u32,
+    pub(crate) columns: u32,
+    pub(crate) points: Vec<Point3<f32>>,
+}
+
+/// Grids from a sequence of anything that NumPy makes (rows, columns, 3) arrays from.
+pub(crate) fn grids(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Grid>> {
+    let items = value.try_iter().map_err(|_| {
+        input(format!(
+            "{name}: expected a sequence of arrays of shape (rows, columns, 3), got {}",
+            describe(value)
+        ))
+    })?;
+    items
+        .enumerate()
+        .map(|(index, item)| {
+            let item = item?;
+            let wrong = || {
+                input(format!(
+                    "{name}: patch {index}: expected numbers of shape (rows, columns, 3), got {}",
+                    describe(&item)
+                ))
+            };
+            let array: PyArrayLike3<'_, f32, AllowTypeChange> =
+                item.extract().map_err(|_| wrong())?;
+            let view = array.as_array();
+            let (rows, columns, axes) = view.dim();
+            let (Ok(rows), Ok(columns), 3) = (u32::try_from(rows), u32::try_from(columns), axes)
+            else {
+                return Err(wrong());
+            };
+            let points = view
+                .rows()
+                .into_iter()
+                .map(|row| Point3::new(row[0], row[1], row[2]))
+                .collect();
+            Ok(Grid {
+                rows,
+                columns,
+                points,
+            })
+        })
+        .collect()
 }
 
 /// A vector of three finite numbers.

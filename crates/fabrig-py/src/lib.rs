@@ -4,6 +4,7 @@
 //! `errors` alone. Long calls run detached from the interpreter and attach for progress.
 
 mod arrays;
+mod cloth;
 mod errors;
 mod mesh;
 mod motion;
@@ -19,6 +20,7 @@ use pyo3::prelude::*;
 fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     errors::register(m)?;
+    m.add_class::<cloth::PyCloth>()?;
     m.add_class::<mesh::PyMesh>()?;
     m.add_class::<rig::PyRig>()?;
     m.add_class::<motion::PyClip>()?;

@@ -87,7 +87,7 @@ def test_the_stub_names_what_the_module_has():
     for name in fabrig.__all__:
         assert re.search(rf"\b{re.escape(name)}\b", stub), name
     extension = sys.modules["fabrig._fabrig"]
-    for kind in (fabrig.Mesh, fabrig.Rig, fabrig.Clip, fabrig.Simulation):
+    for kind in (fabrig.Cloth, fabrig.Mesh, fabrig.Rig, fabrig.Clip, fabrig.Simulation):
         for member in vars(kind):
             if not member.startswith("_"):
                 assert re.search(rf"def {member}\(", stub), f"{kind.__name__}.{member}"

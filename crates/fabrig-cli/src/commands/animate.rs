@@ -145,9 +145,11 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
     line(
         "guards",
         format!(
-            "{} displacements clamped, {} fallbacks to backward Euler, {} patches put back",
+            "{} displacements clamped, {} fallbacks to backward Euler, {} to descent, {} patches \
+             put back",
             report.guards.clamped_displacements,
             report.guards.euler_fallbacks,
+            report.guards.robust_fallbacks,
             report.guards.frozen_patches
         ),
     );

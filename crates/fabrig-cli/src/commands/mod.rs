@@ -2,7 +2,6 @@
 
 mod animate;
 mod bench;
-mod bench_registration;
 mod demo;
 mod info;
 mod pose;

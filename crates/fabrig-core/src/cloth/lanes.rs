@@ -228,16 +228,8 @@ macro_rules! lanes {
 }
 
 lanes!(
-    /// Four single-precision lanes.
-    F32x4, f32, 4, 16
-);
-lanes!(
     /// Eight single-precision lanes.
     F32x8, f32, 8, 32
-);
-lanes!(
-    /// Four double-precision lanes.
-    F64x4, f64, 4, 32
 );
 lanes!(
     /// Eight double-precision lanes.
@@ -353,10 +345,10 @@ mod tests {
 
     #[test]
     fn every_lane_does_what_a_scalar_does() {
-        let a = [1.5_f32, -2.0, 0.3, 7.0];
-        let b = [0.1_f32, 3.0, -0.7, 7.0];
-        let (la, lb) = (F32x4(a), F32x4(b));
-        for lane in 0..4 {
+        let a = [1.5_f32, -2.0, 0.3, 7.0, 1.0, -1e9, 0.0, 4.0];
+        let b = [0.1_f32, 3.0, -0.7, 7.0, -1.0, 2.0, 5.0, 4.5];
+        let (la, lb) = (F32x8(a), F32x8(b));
+        for lane in 0..8 {
             let scalars = [
                 a[lane] + b[lane],
                 a[lane] - b[lane],
@@ -375,7 +367,7 @@ mod tests {
                 -la,
                 (la * la).sqrt(),
                 la.max(lb),
-                Real::select_less(la, lb, F32x4::splat(1.0), F32x4::splat(2.0)),
+                Real::select_less(la, lb, F32x8::splat(1.0), F32x8::splat(2.0)),
             ];
             for (scalar, l) in scalars.iter().zip(lanes) {
                 assert_eq!(scalar.to_bits(), l.0[lane].to_bits());

@@ -40,6 +40,12 @@
 //! v_(n+1) = (x_(n+1) - x_b) / h_e
 //! ```
 //!
+//! Around that stand a robust mode (vertex block descent in which the energy of a step never
+//! rises) and, as a baseline, position-based dynamics as in the paper's Algorithm 1; see
+//! [`Mode`]. Guards watch every patch: displacements are clamped to half an edge per substep,
+//! a patch whose energy rises beyond what was put in falls back to backward Euler, then to the
+//! robust mode, and in the end is put back to its target. All are counted in [`Counters`].
+//!
 //! The state is the displacement u = x - X from the target, in single precision; while edges
 //! are projected, positions are relative to the patch's centre. Forces and constraints are in
 //! [`constraints`](self#modules), materials in [`Material`].
@@ -73,7 +79,7 @@ mod tests;
 
 pub use error::ClothError;
 pub use input::{
-    ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator,
+    ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,
     PatchMotion, Precision, STANDING_GRAVITY,
 };
 pub use materials::{Material, MaterialError, Materials, TIME_UNIT};

@@ -23,15 +23,30 @@ pub struct Counters {
     /// Patches whose energy rose beyond what was put in, and which fell back to backward Euler
     /// for the next two frames.
     pub euler_fallbacks: u64,
+    /// Patches that went on having too much energy, and are solved by descent for the next
+    /// half second.
+    #[serde(default)]
+    pub robust_fallbacks: u64,
     /// Patches that were put back to their targets, because their state was no number or far
     /// away or had a thousand times the energy put in.
     pub frozen_patches: u64,
+}
+
+impl Counters {
+    /// How often any guard acted.
+    pub fn total(&self) -> u64 {
+        self.clamped_displacements
+            + self.euler_fallbacks
+            + self.robust_fallbacks
+            + self.frozen_patches
+    }
 }
 
 impl AddAssign for Counters {
     fn add_assign(&mut self, other: Self) {
         self.clamped_displacements += other.clamped_displacements;
         self.euler_fallbacks += other.euler_fallbacks;
+        self.robust_fallbacks += other.robust_fallbacks;
         self.frozen_patches += other.frozen_patches;
     }
 }

@@ -11,12 +11,15 @@ use super::group::{Group, GroupPairs, Monitor, Partner, PatchGroup, Substep};
 use super::input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion, Precision,
 };
-use super::lanes::{F32x4, F32x8, F64x4, F64x8};
+use super::lanes::{F32x8, F64x8};
 use super::report::{Counters, Energies, StepReport};
 use super::validate;
 
 /// Substeps of a long frame are at most this many times those of 1/60 s.
 const LONGEST_FRAME: u32 = 8;
+
+/// Substeps that share an evaluation of the wind, which changes more slowly than they do.
+const WIND_SUBSTEPS: u32 = 8;
 
 /// Energy may exceed the bound by this factor before a patch falls back.
 const ENERGY_TOLERANCE: f64 = 4.0;
@@ -24,11 +27,15 @@ const ENERGY_TOLERANCE: f64 = 4.0;
 /// Energy may exceed the bound by this factor before a patch is frozen.
 const FREEZE_TOLERANCE: f64 = 1e3;
 
+/// A patch that has fallen back in this many frames on end is solved by descent as well.
+const LONGEST_EULER: u32 = 3;
+
 /// A patch that has fallen back in this many frames on end is frozen.
 const LONGEST_TROUBLE: u32 = 30;
 
-/// Frames of backward Euler after a fall-back.
+/// Frames of backward Euler after a fall-back, and of descent after a fall-back to that.
 const EULER_FRAMES: u32 = 2;
+const ROBUST_FRAMES: u32 = 30;
 
 /// A cloth of patches, drawn to moving targets. See the [module](super) for the method.
 pub struct Cloth {
@@ -280,13 +287,19 @@ impl Cloth {
         let h = dt / f64::from(count);
         let progress = [k, k + 1].map(|i| f64::from(i) / f64::from(count));
         let f = self.fields.between(end, progress[1]);
+        let first = k - k % WIND_SUBSTEPS;
+        let shared = WIND_SUBSTEPS.min(count - first);
+        let middle = f64::from(first) + 0.5 * f64::from(shared);
+        let wind = self.fields.between(end, middle / f64::from(count)).wind;
         Substep {
             h,
             previous_h: if k == 0 { self.previous_h } else { h },
             progress,
             uniform: (f.gravity - f.linear).into(),
             angular: [f.angular_velocity.into(), f.angular_acceleration.into()],
-            wind: f.wind.into(),
+            wind: wind.into(),
+            wind_horizon: (k == first && wind != Vector3::zeros())
+                .then(|| 0.5 * h * f64::from(shared)),
         }
     }
 
@@ -330,8 +343,11 @@ impl Cloth {
                     self.energies[patch] = Energies::default();
                     self.ceilings[patch] = 0.0;
                     *trouble = 0;
+                } else if *trouble > LONGEST_EULER {
+                    group.fall_back(lane, ROBUST_FRAMES, true);
+                    counters.robust_fallbacks += 1;
                 } else if *trouble > 0 {
-                    group.fall_back(lane, EULER_FRAMES);
+                    group.fall_back(lane, EULER_FRAMES, false);
                     counters.euler_fallbacks += 1;
                 }
                 sum += self.energies[patch];
@@ -427,13 +443,10 @@ fn make_group(
     members: &[usize],
     options: &ClothOptions,
 ) -> Box<dyn PatchGroup> {
-    match (options.precision, members.len()) {
-        (Precision::Double, 1) => Box::new(Group::<f64>::new(patches, members, options)),
-        (Precision::Double, 2..=4) => Box::new(Group::<F64x4>::new(patches, members, options)),
-        (Precision::Double, _) => Box::new(Group::<F64x8>::new(patches, members, options)),
-        (_, 1) => Box::new(Group::<f32>::new(patches, members, options)),
-        (_, 2..=4) => Box::new(Group::<F32x4>::new(patches, members, options)),
-        _ => Box::new(Group::<F32x8>::new(patches, members, options)),
+    match options.precision {
+        Precision::Double => Box::new(Group::<F64x8>::new(patches, members, options)),
+        Precision::SingleScalar => Box::new(Group::<f32>::new(patches, members, options)),
+        Precision::Single => Box::new(Group::<F32x8>::new(patches, members, options)),
     }
 }
 

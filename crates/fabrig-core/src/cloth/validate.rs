@@ -21,6 +21,7 @@ const LONGEST_FRAME: f64 = 10.0;
 pub(crate) fn options(o: &ClothOptions) -> Result<(), ClothError> {
     let ranges = [
         ("substeps", f64::from(o.substeps), 1.0, 4096.0),
+        ("sweeps", f64::from(o.sweeps), 1.0, 64.0),
         ("rest_blend", o.rest_blend, 0.0, 1.0),
         ("rest_imperfection", o.rest_imperfection, 0.0, 1.0),
         ("areal_density", o.areal_density, 1e-9, 1e9),

@@ -287,16 +287,12 @@ fn stats(report: &FrameReport) -> [f64; STAT_NAMES.len()] {
         energies.bend,
         energies.pressure,
         energies.total(),
-        guard_total(&report.step.counters) as f64,
+        report.step.counters.total() as f64,
     ]
 }
 
-fn guard_total(counters: &Counters) -> u64 {
-    counters.clamped_displacements + counters.euler_fallbacks + counters.frozen_patches
-}
-
 fn guard_event(counters: &Counters) -> Option<LogEvent> {
-    (guard_total(counters) > 0).then(|| LogEvent {
+    (counters.total() > 0).then(|| LogEvent {
         level: LogLevel::Warning,
         message: format!(
             "guards acted: {} displacements clamped, {} patches on backward Euler, {} put back",

@@ -1,13 +1,15 @@
 //! Scenes: what to model around a rig, and stepping it through a take.
 
 mod anchors;
+mod bench_face;
 mod chain_loss;
 mod description;
 mod error;
 mod head;
 mod simulation;
 
+pub use bench_face::face_bench_scene;
 pub use chain_loss::{LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss};
 pub use description::{Dynamics, EyeSource, Scene};
 pub use error::SceneError;
-pub use simulation::{FacePose, FrameReport, PartPose, Simulation};
+pub use simulation::{FacePose, FrameReport, PartPose, Simulation, cloth_patches};

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Attachment;
+use crate::cloth::bench::SceneFrame;
 use crate::cloth::{
     Cloth, ClothAttachment, ClothPatch, FrameInput, HeadMotion, Materials, PatchMotion, StepReport,
 };
@@ -108,25 +109,16 @@ impl Simulation {
     ///
     /// [`SceneError`] where the rig's materials or sizes do not fit.
     pub fn new(rig: Arc<Rig>, scene: Scene, clip: Option<Clip>) -> Result<Self, SceneError> {
+        let patches = cloth_patches(&rig)?;
         let names: Vec<&str> = rig.shape_names.iter().map(String::as_str).collect();
         let channels = clip
             .as_ref()
             .map_or_else(|| vec![None; names.len()], |c| c.channel_indices(&names));
-        let materials = Materials::parse(&rig.materials)?;
-        let mut patches = Vec::with_capacity(rig.patches.len());
-        let mut anchored = Vec::with_capacity(rig.patches.len());
-        for patch in &rig.patches {
-            let chart = &patch.patch.chart;
-            let attachments: Vec<ClothAttachment> =
-                chart.attachments.iter().map(to_cloth_attachment).collect();
-            anchored.push(BoneAnchors::new(&rig, patch));
-            patches.push(ClothPatch {
-                shape: chart.grid,
-                rest: patch.patch.neutral.iter().map(|q| q.cast()).collect(),
-                material: *materials.get(&chart.material)?,
-                attachments,
-            });
-        }
+        let anchored = rig
+            .patches
+            .iter()
+            .map(|patch| BoneAnchors::new(&rig, patch))
+            .collect();
         let cloth = match scene.dynamics {
             Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
             Dynamics::None => None,
@@ -205,6 +197,11 @@ impl Simulation {
         self.move_skin()
     }
 
+    /// Takes a pose without moving anything: only the muscle shapes are evaluated.
+    pub(super) fn pose_to(&mut self, pose: FacePose) -> Result<(), SceneError> {
+        self.evaluate(pose)
+    }
+
     /// Goes `dt` seconds on along the clip.
     ///
     /// # Errors
@@ -251,6 +248,20 @@ impl Simulation {
         report.time = self.time;
         (report.settle_rms, report.settle_max) = self.settle_error();
         Ok(report)
+    }
+
+    /// What the cloth is told of the frame of `dt` seconds that led to the present pose, on its
+    /// own: for running the solver without the face.
+    pub fn cloth_frame(&self, dt: f64) -> SceneFrame {
+        let to_head = self.pose.head.rotation.inverse();
+        SceneFrame {
+            dt,
+            targets: self.targets.clone(),
+            anchors: self.anchors.clone(),
+            gravity: Some((to_head * self.scene.gravity.cast::<f64>()).cast()),
+            wind: (to_head * self.pose.wind).cast(),
+            head: self.pose.head_motion,
+        }
     }
 
     /// The rig.
@@ -441,6 +452,27 @@ impl Simulation {
 fn about(center: &Point, turn: UnitQuaternion<f64>, slide: Vector) -> Isometry3<f64> {
     let shift = center.coords - turn * center.coords + slide;
     Isometry3::from_parts(Translation3::from(shift), turn)
+}
+
+/// The patches of a rig as the cloth takes them.
+///
+/// # Errors
+///
+/// [`SceneError`] where the rig's materials cannot be read or lack one that a patch names.
+pub fn cloth_patches(rig: &Rig) -> Result<Vec<ClothPatch>, SceneError> {
+    let materials = Materials::parse(&rig.materials)?;
+    rig.patches
+        .iter()
+        .map(|patch| {
+            let chart = &patch.patch.chart;
+            Ok(ClothPatch {
+                shape: chart.grid,
+                rest: patch.patch.neutral.iter().map(|q| q.cast()).collect(),
+                material: *materials.get(&chart.material)?,
+                attachments: chart.attachments.iter().map(to_cloth_attachment).collect(),
+            })
+        })
+        .collect()
 }
 
 fn to_cloth_attachment(attachment: &Attachment) -> ClothAttachment {

@@ -8,6 +8,7 @@
 
 from ._fabrig import (
     Clip,
+    Cloth,
     FabrigError,
     InputError,
     Mesh,
@@ -33,6 +34,7 @@ from ._fabrig import (
 
 __all__ = [
     "Clip",
+    "Cloth",
     "FabrigError",
     "InputError",
     "Mesh",

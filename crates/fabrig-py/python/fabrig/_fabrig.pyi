@@ -1,4 +1,4 @@
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
 from typing import Any
 
@@ -20,6 +20,48 @@ class RecordingError(FabrigError): ...
 Faces = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
 Path = str | PathLike[str]
 Progress = Callable[[str, float], object]
+
+MaterialLike = str | Mapping[str, float | str]
+
+class Cloth:
+    def __init__(
+        self,
+        grids: Iterable[ArrayLike],
+        *,
+        material: MaterialLike | Sequence[MaterialLike] | None = None,
+        periodic: bool | Sequence[bool] | None = None,
+        anchors: Sequence[Sequence[int] | None] | None = None,
+        anchor_strength: float = 1.0,
+        pairs: Sequence[tuple[int, int, Sequence[tuple[int, int]], float]] | None = None,
+        substeps: int | None = None,
+        rest_blend: float | None = None,
+        rest_imperfection: float | None = None,
+        seed: int | None = None,
+        standing_gravity: ArrayLike | None = None,
+        precision: str | None = None,
+        integrator: str | None = None,
+    ) -> None: ...
+    def step(
+        self,
+        dt: float,
+        targets: Iterable[ArrayLike],
+        velocities: Iterable[ArrayLike] | None = None,
+        *,
+        anchors: Iterable[ArrayLike | None] | None = None,
+        gravity: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> dict[str, Any]: ...
+    def reset(
+        self,
+        targets: Iterable[ArrayLike],
+        velocities: Iterable[ArrayLike] | None = None,
+        *,
+        anchors: Iterable[ArrayLike | None] | None = None,
+    ) -> None: ...
+    @property
+    def positions(self) -> list[NDArray[np.float32]]: ...
+    @property
+    def patch_count(self) -> int: ...
 
 class Mesh:
     def __init__(self, vertices: ArrayLike, faces: Faces) -> None: ...

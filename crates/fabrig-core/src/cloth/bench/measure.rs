@@ -3,19 +3,22 @@
 use std::time::Instant;
 
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
 
 use super::scene::BenchScene;
-use crate::cloth::{Cloth, ClothError, ClothOptions, Counters, FrameInput};
+use crate::cloth::{Cloth, ClothError, ClothOptions, Counters};
 
-/// A run of the scene.
+/// A run of a scene.
 #[derive(Debug, Clone)]
 pub struct Run {
     /// Wall time of [`Cloth::step`] for each frame, warm-up left out. (ms)
     pub frame_ms: Vec<f64>,
-    /// Positions of all nodes of all patches, frame by frame. (mm)
+    /// Positions of all nodes of all patches, for every kept frame. (mm)
     pub frames: Vec<Vec<Point3<f64>>>,
     /// Guards that acted.
     pub counters: Counters,
+    /// Largest energy at the end of a frame. [mass mm^2/s^2]
+    pub peak_energy: f64,
 }
 
 impl Run {
@@ -31,7 +34,8 @@ impl Run {
     }
 }
 
-/// Runs `frames` frames of 1/60 s. Every `keep`-th frame's positions are kept (0: none).
+/// Runs the first `frames` frames of a scene. Every `keep`-th frame's positions are kept
+/// (0: none).
 ///
 /// # Errors
 ///
@@ -42,23 +46,21 @@ pub fn run(
     frames: usize,
     keep: usize,
 ) -> Result<Run, ClothError> {
-    let dt = 1.0 / 60.0;
     let mut cloth = Cloth::new(&scene.patches, options)?;
+    scene.place(&mut cloth)?;
     let mut out = Run {
         frame_ms: Vec::new(),
         frames: Vec::new(),
         counters: Counters::default(),
+        peak_energy: 0.0,
     };
-    for frame in 1..=frames {
-        let t = frame as f64 * dt;
-        let targets = scene.targets(t);
-        let mut input = FrameInput::new(dt, &targets);
-        input.head = BenchScene::head(t);
+    for (index, frame) in scene.frames.iter().take(frames).enumerate() {
         let start = Instant::now();
-        let report = cloth.step(&input)?;
+        let report = cloth.step(&frame.input())?;
         out.frame_ms.push(start.elapsed().as_secs_f64() * 1e3);
         out.counters += report.counters;
-        if keep > 0 && frame % keep == 0 {
+        out.peak_energy = out.peak_energy.max(report.energies.total());
+        if keep > 0 && (index + 1) % keep == 0 {
             let mut all = Vec::with_capacity(scene.node_count());
             for (index, patch) in scene.patches.iter().enumerate() {
                 all.extend((0..patch.rest.len()).map(|node| cloth.node_state(index, node).0));
@@ -67,12 +69,13 @@ pub fn run(
         }
     }
     // The first frames warm caches.
-    out.frame_ms.drain(..frames.min(5).min(frames / 2));
+    let warm_up = (out.frame_ms.len() / 2).min(5);
+    out.frame_ms.drain(..warm_up);
     Ok(out)
 }
 
 /// How far a run is from a reference.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Difference {
     /// Largest RMS over frames. (mm)
     pub rms: f64,
@@ -93,11 +96,7 @@ pub fn difference(scene: &BenchScene, run: &Run, reference: &Run) -> Difference 
         let sum: f64 = a.iter().zip(b).map(|(p, q)| (p - q).norm_squared()).sum();
         (sum / a.len() as f64).sqrt()
     };
-    let mut out = Difference {
-        rms: 0.0,
-        max: 0.0,
-        relative: 0.0,
-    };
+    let mut out = Difference::default();
     let mut motion = 0.0_f64;
     for (a, b) in run.frames.iter().zip(&reference.frames) {
         out.rms = out.rms.max(rms(a, b));
@@ -108,4 +107,15 @@ pub fn difference(scene: &BenchScene, run: &Run, reference: &Run) -> Difference 
     }
     out.relative = out.rms / motion;
     out
+}
+
+/// The scene with every third node of the neutral shapes moved by a micrometre.
+pub fn nudged(scene: &BenchScene) -> BenchScene {
+    let mut scene = scene.clone();
+    for patch in &mut scene.patches {
+        for p in patch.rest.iter_mut().step_by(3) {
+            p.z += 1e-3;
+        }
+    }
+    scene
 }

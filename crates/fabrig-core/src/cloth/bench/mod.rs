@@ -1,11 +1,19 @@
-//! Speed beside error: a face-sized scene, timed runs, and their difference to a reference.
+//! Speed beside error: scenes, timed runs, their difference to a converged reference, the
+//! floor that the bare kernels set, hard cases.
 //!
-//! The scene has the sizes of the default face rig (41 grids of 21 x 20 and 3 rings of 48 x 15,
-//! 19,380 nodes) and moves like one, but is made of domes and rings, so that it needs nothing
-//! but the solver.
+//! Scenes are lists of frames, so that the solver runs alone: a face-sized one made of domes and
+//! rings, the standard patch of 24 x 24 nodes at any stiffness ratio, and (from
+//! [`crate::scene::face_bench_scene`]) a rig on a take.
 
+mod floor;
 mod measure;
+mod pareto;
 mod scene;
+mod stability;
+mod synthetic;
 
-pub use measure::{Difference, Run, difference, run};
-pub use scene::BenchScene;
+pub use floor::{Floor, constraint_count, floor};
+pub use measure::{Difference, Run, difference, nudged, run};
+pub use pareto::{Pareto, ParetoPoint, Setting, pareto, settings};
+pub use scene::{BenchScene, SceneFrame};
+pub use stability::{CaseResult, Extent, random_scenes, stability};

@@ -1,82 +1,67 @@
-//! The scene: as many patches, nodes and attachments as a face has, drawn to smooth targets.
+//! A scene: patches, and what the cloth is told frame by frame.
 
-use std::f64::consts::TAU;
+use nalgebra::Vector3;
 
-use nalgebra::{Point3, Vector3};
+use crate::cloth::{Cloth, ClothError, ClothPatch, FrameInput, HeadMotion, PatchMotion};
 
-use crate::cloth::{ClothAttachment, ClothPatch, GridShape, HeadMotion, Material, PatchMotion};
+/// One frame of a scene, as [`FrameInput`] with arrays of its own.
+#[derive(Debug, Clone)]
+pub struct SceneFrame {
+    /// Duration. (s)
+    pub dt: f64,
+    /// Motion of the targets, one per patch.
+    pub targets: Vec<PatchMotion>,
+    /// Motion of the anchors, one per patch, or none at all.
+    pub anchors: Vec<PatchMotion>,
+    /// Gravity in the head frame; none: as it stands. (mm/s^2)
+    pub gravity: Option<Vector3<f32>>,
+    /// Velocity of the air in the head frame. (mm/s)
+    pub wind: Vector3<f32>,
+    /// Motion of the head frame.
+    pub head: HeadMotion,
+}
 
-/// Patches, and targets as a function of time.
+impl SceneFrame {
+    /// What [`Cloth::step`] takes.
+    pub fn input(&self) -> FrameInput<'_> {
+        FrameInput {
+            dt: self.dt,
+            targets: &self.targets,
+            anchors: &self.anchors,
+            gravity: self.gravity,
+            wind: self.wind,
+            head: self.head,
+        }
+    }
+}
+
+/// Patches and frames.
 #[derive(Debug, Clone)]
 pub struct BenchScene {
+    /// What it is.
+    pub name: String,
     /// The patches.
     pub patches: Vec<ClothPatch>,
-    /// Displacement of every node of every patch at full weight. (mm)
-    poses: Vec<Vec<Vector3<f32>>>,
+    /// Where it starts: the cloth is reset to it.
+    pub start: SceneFrame,
+    /// The frames.
+    pub frames: Vec<SceneFrame>,
 }
 
 impl BenchScene {
-    /// 29 muscles, 12 fat pads and 3 sphincters, origins anchored, insertions and fat stitched.
-    pub fn face() -> Self {
-        Self::sized(1.0, true)
-    }
-
-    /// The same with `scale` times as many nodes along every grid line, with or without
-    /// attachments between patches.
-    pub fn sized(scale: f64, has_pairs: bool) -> Self {
-        let count = |n: f64| ((n * scale).round() as u32).max(3);
-        let sheet = GridShape {
-            u_count: count(21.0),
-            v_count: count(20.0),
-            is_periodic: false,
-        };
-        let hoop = GridShape {
-            u_count: count(48.0),
-            v_count: count(15.0),
-            is_periodic: true,
-        };
-        let mut patches = Vec::new();
-        for k in 0..29_u32 {
-            let mut patch = dome(sheet, k, Material::LINEAR_MUSCLE);
-            patch.attachments.push(ClothAttachment::Anchors {
-                nodes: (0..sheet.v_count)
-                    .map(|v| sheet.index(0, v) as u32)
-                    .collect(),
-                strength: 1.0,
-            });
-            if has_pairs {
-                let last = sheet.u_count - 1;
-                patch.attachments.push(ClothAttachment::Patch {
-                    patch: 29 + k % 12,
-                    pairs: (0..sheet.v_count)
-                        .map(|v| (sheet.index(last, v) as u32, sheet.index(k % 3, v) as u32))
-                        .collect(),
-                    strength: 0.5,
-                });
-            }
-            patches.push(patch);
+    /// A scene that starts where the first of `frames` ends and goes through the others.
+    ///
+    /// # Panics
+    ///
+    /// If there is no frame.
+    pub fn new(name: &str, patches: Vec<ClothPatch>, mut frames: Vec<SceneFrame>) -> Self {
+        let start = frames.remove(0);
+        Self {
+            name: name.to_owned(),
+            patches,
+            start,
+            frames,
         }
-        for k in 0..12_u32 {
-            let mut patch = dome(sheet, 29 + k, Material::FAT);
-            if has_pairs {
-                let nodes = sheet.node_count() as u32;
-                patch.attachments.push(ClothAttachment::Patch {
-                    patch: 2 * k,
-                    pairs: (0..nodes).step_by(5).map(|i| (i, i)).collect(),
-                    strength: 0.2,
-                });
-            }
-            patches.push(patch);
-        }
-        for k in 0..3_u32 {
-            patches.push(ring(hoop, k));
-        }
-        let poses = patches
-            .iter()
-            .enumerate()
-            .map(|(i, p)| pose(p, i))
-            .collect();
-        Self { patches, poses }
     }
 
     /// How many nodes there are.
@@ -84,107 +69,12 @@ impl BenchScene {
         self.patches.iter().map(|p| p.rest.len()).sum()
     }
 
-    /// Targets at time `t`, in seconds: every patch swings between rest and its pose with its
-    /// own period, between 0.4 and 0.9 s.
-    pub fn targets(&self, t: f64) -> Vec<PatchMotion> {
-        self.patches
-            .iter()
-            .zip(&self.poses)
-            .enumerate()
-            .map(|(i, (patch, pose))| {
-                let rate = TAU / (0.4 + 0.5 * ((i * 7) % 11) as f64 / 10.0);
-                let (s, c) = (rate * t).sin_cos();
-                let (weight, speed) = ((0.5 - 0.5 * c) as f32, (0.5 * rate * s) as f32);
-                PatchMotion {
-                    positions: patch
-                        .rest
-                        .iter()
-                        .zip(pose)
-                        .map(|(p, d)| p + d * weight)
-                        .collect(),
-                    velocities: pose.iter().map(|d| d * speed).collect(),
-                }
-            })
-            .collect()
+    /// Puts a cloth at its start.
+    ///
+    /// # Errors
+    ///
+    /// As [`Cloth::reset`].
+    pub fn place(&self, cloth: &mut Cloth) -> Result<(), ClothError> {
+        cloth.reset(&self.start.targets, &self.start.anchors)
     }
-
-    /// Motion of the head at time `t`, in seconds: a shake of a tenth of a radian at 2 Hz.
-    pub fn head(t: f64) -> HeadMotion {
-        let rate = TAU * 2.0;
-        let (s, c) = (rate * t).sin_cos();
-        HeadMotion {
-            linear_acceleration: Vector3::zeros(),
-            angular_velocity: Vector3::new(0.0, (0.1 * rate * c) as f32, 0.0),
-            angular_acceleration: Vector3::new(0.0, (-0.1 * rate * rate * s) as f32, 0.0),
-        }
-    }
-}
-
-/// A domed sheet of 40 x 38 mm at a place of its own on a head.
-fn dome(shape: GridShape, index: u32, material: Material) -> ClothPatch {
-    let angle = f64::from(index) * 2.4;
-    let height = f64::from(index % 9) * 15.0 - 60.0;
-    let mut rest = Vec::new();
-    for v in 0..shape.v_count {
-        for u in 0..shape.u_count {
-            let x = 40.0 * f64::from(u) / f64::from(shape.u_count - 1) - 20.0;
-            let y = 38.0 * f64::from(v) / f64::from(shape.v_count - 1) - 19.0;
-            let radius = 75.0 - 0.012 * x * x - 0.01 * y * y;
-            let turn = angle + x / 80.0;
-            rest.push(Point3::new(
-                (radius * turn.sin()) as f32,
-                (height + y) as f32,
-                (radius * turn.cos()) as f32,
-            ));
-        }
-    }
-    ClothPatch {
-        shape,
-        rest,
-        material,
-        attachments: Vec::new(),
-    }
-}
-
-/// A ring about an opening of 12 to 33 mm.
-fn ring(shape: GridShape, index: u32) -> ClothPatch {
-    let mut rest = Vec::new();
-    for v in 0..shape.v_count {
-        for u in 0..shape.u_count {
-            let angle = (f64::from(u) + 0.5) / f64::from(shape.u_count) * TAU;
-            let radius = 12.0 + 21.0 * f64::from(v) / f64::from(shape.v_count - 1);
-            let (x, y) = (1.4 * radius * angle.cos(), radius * angle.sin());
-            rest.push(Point3::new(
-                x as f32,
-                (y - 40.0 + 50.0 * f64::from(index)) as f32,
-                (90.0 - 0.008 * (x * x + y * y)) as f32,
-            ));
-        }
-    }
-    ClothPatch {
-        shape,
-        rest,
-        material: Material::SPHINCTER,
-        attachments: Vec::new(),
-    }
-}
-
-/// Contraction by a fifth or so towards the first node, with a swell and a drift.
-fn pose(patch: &ClothPatch, index: usize) -> Vec<Vector3<f32>> {
-    let first = patch.rest[0];
-    let share = 0.12 + 0.02 * (index % 7) as f32;
-    let drift = Vector3::new(
-        1.5 * (index as f32).sin(),
-        2.0 * (index as f32 * 1.7).cos(),
-        1.0,
-    );
-    patch
-        .rest
-        .iter()
-        .map(|p| {
-            let away = p - first;
-            let swell = (away.norm() / 45.0 * std::f32::consts::PI).sin();
-            away * -share + drift + p.coords.normalize() * (3.0 * swell)
-        })
-        .collect()
 }

@@ -59,18 +59,18 @@ pub(crate) fn project_shear<R: Real>(
     }
 }
 
-/// Energy of all diagonals, `sum k C^2 / 2`.
+/// Energy of all diagonals at a progress through the frame, `sum k C^2 / 2`.
 #[inline(always)]
 pub(crate) fn shear_energy<R: Real>(
     diagonals: &[[u32; 2]],
     positions: &[Vec3<R>],
-    rest: &RestLengths<R>,
+    (rest, progress): (&RestLengths<R>, R),
     k: R,
 ) -> R {
     let mut sum = R::splat(0.0);
     for (diagonal, &[i, j]) in diagonals.iter().enumerate() {
         let (i, j) = (i as usize, j as usize);
-        let c = edge_length(positions[i], positions[j]) - rest.at(diagonal, R::splat(1.0));
+        let c = edge_length(positions[i], positions[j]) - rest.at(diagonal, progress);
         sum += R::splat(0.5) * k * c * c;
     }
     sum
@@ -113,9 +113,9 @@ mod tests {
             .iter()
             .map(|p| Vec3::splat([p[0] + 0.3 * p[1], p[1], 0.0]))
             .collect();
-        let before = shear_energy(&diagonals, &sheared, &rest, 2.0);
+        let before = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
         project_shear(&diagonals, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
-        let after = shear_energy(&diagonals, &sheared, &rest, 2.0);
+        let after = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
         assert!(after < 0.05 * before, "{before} -> {after}");
         let mut heap = vec![Vec3::<f64>::zero(); 4];
         project_shear(&diagonals, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);

@@ -157,18 +157,19 @@ pub(crate) fn project_stretch<R: Real>(
     }
 }
 
-/// Energy of all edges at the end of the frame, `sum k C^2 / 2`: stretch and compression.
+/// Energy of all edges at a progress through the frame, `sum k C^2 / 2`: stretch and
+/// compression.
 #[inline(always)]
 pub(crate) fn stretch_energy<R: Real>(
     edges: &[[u32; 2]],
     positions: &[Vec3<R>],
-    rest: &RestLengths<R>,
+    (rest, progress): (&RestLengths<R>, R),
     k: [R; 2],
 ) -> [R; 2] {
     let mut sums = [R::splat(0.0); 2];
     for (edge, &[i, j]) in edges.iter().enumerate() {
         let (a, b) = (positions[i as usize], positions[j as usize]);
-        let [s, c] = edge_energy(a, b, rest.end[edge], k);
+        let [s, c] = edge_energy(a, b, rest.at(edge, progress), k);
         sums[0] += s;
         sums[1] += c;
     }

@@ -2,11 +2,12 @@
 
 use nalgebra::Point3;
 
+use super::descent::merge;
 use super::interface::{GroupPairs, Monitor, PatchGroup, Substep};
 use super::state::{FARTHEST, Group};
 use crate::cloth::constraints::attachment::Port;
-use crate::cloth::input::PatchMotion;
-use crate::cloth::lanes::Real;
+use crate::cloth::input::{Mode, PatchMotion};
+use crate::cloth::lanes::{F32x8, Real};
 use crate::cloth::report::Energies;
 
 impl<R: Real> PatchGroup for Group<R> {
@@ -35,6 +36,7 @@ impl<R: Real> PatchGroup for Group<R> {
             self.lane_states[lane].energy = 0.0;
             self.lane_states[lane].mismatch = self.mismatch.lane(lane);
             self.lane_states[lane].euler_frames = 0;
+            self.lane_states[lane].robust_frames = 0;
         }
     }
 
@@ -67,7 +69,23 @@ impl<R: Real> PatchGroup for Group<R> {
 
     fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]) {
         self.solve_pairs(ports);
-        vectorized(Solve(self, substep));
+        let sweeps = self.sweeps;
+        let is_robust: Vec<bool> = self
+            .lane_states
+            .iter()
+            .map(|s| s.robust_frames > 0)
+            .collect();
+        if self.mode == Mode::Robust || is_robust.iter().all(|&r| r) {
+            vectorized(Descend(self, (substep, sweeps)));
+        } else if is_robust.contains(&true) {
+            let start = self.solution.clone();
+            vectorized(Descend(self, (substep, sweeps)));
+            let robust = std::mem::replace(&mut self.solution, start);
+            self.solve_fast(substep, sweeps);
+            merge(&mut self.solution, &robust, &is_robust);
+        } else {
+            self.solve_fast(substep, sweeps);
+        }
         for state in &mut self.lane_states {
             state.has_history = true;
         }
@@ -111,11 +129,16 @@ impl<R: Real> PatchGroup for Group<R> {
             state.energy = energies.total();
             state.mismatch = mismatch;
             state.euler_frames = state.euler_frames.saturating_sub(1);
+            state.robust_frames = state.robust_frames.saturating_sub(1);
         }
     }
 
-    fn fall_back(&mut self, lane: usize, frames: u32) {
-        self.lane_states[lane].euler_frames = frames;
+    fn fall_back(&mut self, lane: usize, frames: u32, is_robust: bool) {
+        let state = &mut self.lane_states[lane];
+        state.euler_frames = frames;
+        if is_robust {
+            state.robust_frames = frames;
+        }
     }
 
     fn freeze(&mut self, lane: usize) {
@@ -145,10 +168,23 @@ impl<R: Real> PatchGroup for Group<R> {
     }
 }
 
+impl<R: Real> Group<R> {
+    fn solve_fast(&mut self, substep: &Substep, sweeps: u32) {
+        match (self.mode, sweeps) {
+            (Mode::Paper, _) => vectorized(Project(self, (substep, sweeps))),
+            (_, 1) => vectorized(Solve(self, substep)),
+            _ => vectorized(Sweep(self, (substep, sweeps))),
+        }
+    }
+}
+
+/// The widest lanes that patches are put into.
+pub(crate) type Widest = F32x8;
+
 /// Runs `work` compiled for the widest vector instructions that this processor has.
 ///
 /// A closure would not do: it is compiled for the baseline unless it happens to be inlined.
-fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
+pub(crate) fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
 
@@ -175,6 +211,18 @@ vectorized_work!(
 vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
 vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
 vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
+vectorized_work!(
+    Sweep<(&'a Substep, u32)> -> (),
+    |group, how| group.sweep_lanes(how.0, how.1)
+);
+vectorized_work!(
+    Project<(&'a Substep, u32)> -> (),
+    |group, how| group.project_lanes(how.0, how.1)
+);
+vectorized_work!(
+    Descend<(&'a Substep, u32)> -> (),
+    |group, how| group.descend_lanes(how.0, how.1)
+);
 vectorized_work!(Finish<> -> (), |group, | group.finish_lanes());
 vectorized_work!(Turn<&'a Substep> -> (), |group, substep| group.turn_lanes(substep));
 vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());

@@ -119,9 +119,18 @@ impl<R: Real> Group<R> {
         }
         let one = R::splat(1.0);
         let x = &self.solution;
-        let [stretch, compression] =
-            stretch_energy(&self.lists.edges, x, &self.edge_lengths, self.stretch);
-        let shear = shear_energy(&self.lists.diagonals, x, &self.diagonal_lengths, self.shear);
+        let [stretch, compression] = stretch_energy(
+            &self.lists.edges,
+            x,
+            (&self.edge_lengths, one),
+            self.stretch,
+        );
+        let shear = shear_energy(
+            &self.lists.diagonals,
+            x,
+            (&self.diagonal_lengths, one),
+            self.shear,
+        );
         let bend = BendCompliance {
             compliance: one,
             dropoff: self.bend_dropoff,

@@ -19,8 +19,11 @@ pub(crate) struct Substep {
     pub(crate) uniform: [f64; 3],
     /// Angular velocity (rad/s) and acceleration (rad/s^2) of the head frame.
     pub(crate) angular: [[f64; 3]; 2],
-    /// Air velocity. (mm/s)
+    /// Air velocity, half-way through the substeps that share an evaluation of the wind. (mm/s)
     pub(crate) wind: [f64; 3],
+    /// Where the wind is to be evaluated for this substep and some that follow: how far to
+    /// their middle. (s)
+    pub(crate) wind_horizon: Option<f64>,
 }
 
 /// The pairs of a group's nodes with nodes of other patches.
@@ -82,8 +85,9 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn turn(&mut self, following: &Substep, ports: &mut Vec<Port>);
     /// Ends the frame: what the monitor sees, per patch.
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>);
-    /// Takes backward Euler steps for a patch for `frames` frames.
-    fn fall_back(&mut self, lane: usize, frames: u32);
+    /// Takes backward Euler steps for a patch for `frames` frames, solved by descent if
+    /// `is_robust`.
+    fn fall_back(&mut self, lane: usize, frames: u32, is_robust: bool);
     /// Puts a patch back to its target.
     fn freeze(&mut self, lane: usize);
     /// Writes positions of a patch. [mm, head frame]

@@ -2,12 +2,14 @@
 
 use nalgebra::Point3;
 
+use super::descent::Incidence;
 use super::interface::GroupPairs;
+use super::sweeps::Multipliers;
 use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::magnet::Magnet;
 use crate::cloth::constraints::stretch::{RestLengths, edge_length};
 use crate::cloth::constraints::wind::Air;
-use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator};
+use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator, Mode};
 use crate::cloth::lanes::{Real, Vec3};
 
 /// Displacements further than this are taken for a failure. (mm)
@@ -35,6 +37,7 @@ pub(super) struct Anchor {
 pub(super) struct LaneState {
     pub(super) has_history: bool,
     pub(super) euler_frames: u32,
+    pub(super) robust_frames: u32,
     pub(super) energy: f64,
     pub(super) mismatch: f64,
     /// Whether the end slopes of the last frame came from given velocities.
@@ -45,6 +48,8 @@ pub(super) struct LaneState {
 pub(crate) struct Group<R> {
     pub(super) patches: Vec<usize>,
     pub(super) integrator: Integrator,
+    pub(super) mode: Mode,
+    pub(super) sweeps: u32,
     pub(super) has_pressure: bool,
     /// Centre of each patch, which positions are relative to. [mm, head frame]
     pub(super) origin: Vec3<R>,
@@ -102,8 +107,17 @@ pub(crate) struct Group<R> {
     /// X + u_b. (mm)
     pub(super) resting: Vec<Vec3<R>>,
     pub(super) inv_masses: Vec<R>,
-    pub(super) accelerations: Vec<Vec3<R>>,
+    /// What the wind does to every node. (mm/s^2)
+    pub(super) wind_accelerations: Vec<Vec3<R>>,
     pub(super) gradient: Vec<Vec3<R>>,
+    /// Multipliers, where there are several sweeps.
+    pub(super) multipliers: Multipliers<R>,
+    /// Constraints by node, inertial target, positions before a pass, and displacements, where
+    /// there is a descent.
+    pub(super) incidence: Option<Box<Incidence>>,
+    pub(super) inertial: Vec<Vec3<R>>,
+    pub(super) trial: Vec<Vec3<R>>,
+    pub(super) scratch: Vec<Vec3<R>>,
 
     /// Effective step for which `inv_masses` holds.
     pub(super) masses_h_e: R,
@@ -192,6 +206,8 @@ impl<R: Real> Group<R> {
         Self {
             patches: patches.to_vec(),
             integrator: options.integrator,
+            mode: options.mode,
+            sweeps: options.sweeps,
             has_pressure: patches.iter().any(|&p| all[p].material.pressure > 0.0),
             origin,
             mass: per_lane(&|p| p.material.mass),
@@ -250,7 +266,12 @@ impl<R: Real> Group<R> {
             past: zero.clone(),
             resting: zero.clone(),
             inv_masses: vec![R::splat(0.0); n],
-            accelerations: zero.clone(),
+            wind_accelerations: zero.clone(),
+            multipliers: Multipliers::default(),
+            incidence: None,
+            inertial: Vec::new(),
+            trial: Vec::new(),
+            scratch: zero.clone(),
             gradient: zero,
             masses_h_e: R::splat(-1.0),
             h_e: R::splat(0.0),

@@ -9,7 +9,7 @@ use crate::cloth::constraints::attachment::anchor_pull;
 use crate::cloth::constraints::damping::damping_mass;
 use crate::cloth::constraints::inertia::{FrameForces, frame_acceleration};
 use crate::cloth::constraints::wind::add_wind;
-use crate::cloth::input::Integrator;
+use crate::cloth::input::{Integrator, Mode};
 use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::time::{Stencil, hermite};
 
@@ -31,6 +31,8 @@ struct Prediction<R> {
     /// Added masses that draw to X, and to X + u_b. [mass]
     pull: R,
     follow: R,
+    /// What an anchor's stiffness counts with. [s^2]
+    anchored: R,
     /// Hermite weights of the target, of its step now, and of its step before, where that was
     /// in the same frame.
     target: [R; 3],
@@ -50,8 +52,8 @@ struct Uniform<R>(Vec3<R>);
 /// Of a turning head; the second is the centre of the patches. (mm)
 struct Turning<R>(FrameForces<R>, Vec3<R>);
 
-/// Evaluated beforehand.
-struct Listed<'a, R>(&'a [Vec3<R>]);
+/// Of a turning head in wind, whose share was evaluated beforehand.
+struct Windy<'a, R>(Turning<R>, &'a [Vec3<R>]);
 
 impl<R: Real> Field<R> for Uniform<R> {
     #[inline(always)]
@@ -67,10 +69,10 @@ impl<R: Real> Field<R> for Turning<R> {
     }
 }
 
-impl<R: Real> Field<R> for Listed<'_, R> {
+impl<R: Real> Field<R> for Windy<'_, R> {
     #[inline(always)]
-    fn at(&self, i: usize, _: Vec3<R>, _: Vec3<R>) -> Vec3<R> {
-        self.0[i]
+    fn at(&self, i: usize, x: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
+        self.0.at(i, x, v) + self.1[i]
     }
 }
 
@@ -81,6 +83,7 @@ impl<R: Real> Group<R> {
         for lane in 0..R::LANES {
             let state = &self.lane_states[lane];
             let is_euler = self.integrator == Integrator::BackwardEuler
+                || self.mode == Mode::Paper
                 || !state.has_history
                 || state.euler_frames > 0;
             let stencil = if is_euler {
@@ -102,9 +105,14 @@ impl<R: Real> Group<R> {
             return;
         }
         self.masses_h_e = h_e;
-        let shared = self.mass
-            + damping_mass(self.mass, self.damping, h_e)
-            + self.magnet.added_mass(self.mass, h_e);
+        let damped = self.mass + damping_mass(self.mass, self.damping, h_e);
+        if self.mode == Mode::Paper {
+            // Springs are projected, all of them.
+            let shared = damped + self.magnet.past_mass(self.mass, h_e);
+            self.inv_masses.fill(R::splat(1.0) / shared);
+            return;
+        }
+        let shared = damped + self.magnet.added_mass(self.mass, h_e);
         for (w, &anchor) in self.inv_masses.iter_mut().zip(&self.anchor_stiffness) {
             *w = R::splat(1.0) / (shared + anchor * h_e * h_e);
         }
@@ -126,10 +134,12 @@ impl<R: Real> Group<R> {
             ]
         };
         let after = self.weights[1];
+        let is_folded = if self.mode == Mode::Paper { 0.0 } else { 1.0 };
         Prediction {
             history,
             h_e,
-            pull: self.magnet.stiffness * (h_e * h_e),
+            pull: self.magnet.stiffness * (h_e * h_e) * R::splat(is_folded),
+            anchored: h_e * h_e * R::splat(is_folded),
             follow: self.magnet.past_mass(self.mass, h_e),
             target: [R::splat(after[0]), R::splat(after[1]), R::splat(after[2])],
             step: difference(self.weights),
@@ -148,7 +158,7 @@ impl<R: Real> Group<R> {
     /// End of a substep and first half of the one that follows in the same frame.
     #[inline(always)]
     pub(super) fn turn_lanes(&mut self, substep: &Substep) {
-        if substep.wind == [0.0; 3] {
+        if substep.wind_horizon.is_none() {
             // The new state needs the old effective step.
             let inv_h = R::splat(1.0) / self.h_e;
             let prediction = self.begin_substep(substep);
@@ -186,10 +196,13 @@ impl<R: Real> Group<R> {
     fn predict_all<const IS_TURN: bool>(&mut self, substep: &Substep, p: &Prediction<R>) {
         let [w, dw] = substep.angular;
         let squared = if substep.wind != [0.0; 3] {
-            self.evaluate_fields(substep, p);
-            let accelerations = std::mem::take(&mut self.accelerations);
-            let sum = self.predict_in::<IS_TURN, _>(&Listed(&accelerations), p);
-            self.accelerations = accelerations;
+            if let Some(horizon) = substep.wind_horizon {
+                self.evaluate_wind(substep, horizon);
+            }
+            let turning = Turning(FrameForces::new(substep.uniform, w, dw), self.origin);
+            let wind = std::mem::take(&mut self.wind_accelerations);
+            let sum = self.predict_in::<IS_TURN, _>(&Windy(turning, &wind), p);
+            self.wind_accelerations = wind;
             sum
         } else if [w, dw] != [[0.0; 3]; 2] {
             let forces = FrameForces::new(substep.uniform, w, dw);
@@ -232,7 +245,7 @@ impl<R: Real> Group<R> {
             // The mass-weighted mean of y, x_b, X + u_b and X, as a change of x_b: the rounding
             // of the weights' sum then does not act on x_b.
             let coasting = vb * p.h_e + acceleration * h_e2;
-            let draw = p.pull + self.anchor_stiffness[i] * h_e2;
+            let draw = p.pull + self.anchor_stiffness[i] * p.anchored;
             let top = coasting * self.mass + (ub - xb) * p.follow - xb * draw;
             self.targets[i] = target;
             self.past[i] = xb;
@@ -283,48 +296,52 @@ impl<R: Real> Group<R> {
         }
     }
 
-    /// Accelerations of all nodes where the stencil expects them at the end of the substep,
-    /// with the wind.
+    /// What the wind does to every node where it is expected after `horizon` (s).
     #[inline(always)]
-    fn evaluate_fields(&mut self, substep: &Substep, p: &Prediction<R>) {
-        let [w, dw] = substep.angular;
-        let forces = FrameForces::new(substep.uniform, w, dw);
-        let two = R::splat(2.0);
-        // Extrapolated state, in arrays that are free until later in the substep.
-        for i in 0..self.targets.len() {
-            let m = self.node_motion(i);
-            let target = self.starts[i] + self.weighted(i, p.target);
-            let x = target + (m.u * two - m.previous_u);
-            let v = m.v * two - m.previous_v;
-            self.solution[i] = x;
-            self.past[i] = v;
-            self.accelerations[i] = frame_acceleration(&forces, self.origin + x, v);
+    fn evaluate_wind(&mut self, substep: &Substep, horizon: f64) {
+        let now = self.weights[0];
+        let now = [R::splat(now[0]), R::splat(now[1]), R::splat(now[2])];
+        let horizon = R::splat(horizon);
+        // The expected state, in an array that is free until later in the substep.
+        for i in 0..self.solution.len() {
+            let target = self.starts[i] + self.weighted(i, now);
+            self.solution[i] = target + self.displacements[i] + self.velocities[i] * horizon;
         }
+        self.wind_accelerations.fill(Vec3::zero());
         add_wind(
             &self.lists.cells,
             &self.solution,
-            &self.past,
+            &self.velocities,
             Vec3::splat(substep.wind),
             &self.air,
             self.inv_air_mass,
-            &mut self.accelerations,
+            &mut self.wind_accelerations,
         );
     }
 
     /// Draws anchored nodes to their anchors.
     fn pull_to_anchors(&mut self) {
-        let weights = self.weights[1];
-        for anchor in &self.anchors {
+        if self.mode == Mode::Paper {
+            return;
+        }
+        for k in 0..self.anchors.len() {
+            let anchor = &self.anchors[k];
             let (node, lane) = (anchor.node, anchor.lane);
-            let target = self.targets[node].lane(lane);
-            let offset = [0, 1, 2].map(|axis| {
-                let moved: f64 = (0..3).map(|k| weights[k] * anchor.segment[k][axis]).sum();
-                anchor.start[axis] + moved - target[axis]
-            });
-            let (pull, _) = anchor_pull(offset, anchor.stiffness, self.h_e.lane(lane));
+            let h_e = self.h_e.lane(lane);
+            let (pull, _) = anchor_pull(self.anchor_offset(k), anchor.stiffness, h_e);
             let w = self.inv_masses[node].lane(lane);
             let u = self.solution[node].lane(lane);
             self.solution[node].set_lane(lane, [0, 1, 2].map(|k| u[k] + pull[k] * w));
         }
+    }
+
+    /// An anchor's offset from its node's target at the end of the substep. (mm)
+    pub(super) fn anchor_offset(&self, index: usize) -> [f64; 3] {
+        let (anchor, weights) = (&self.anchors[index], self.weights[1]);
+        let target = self.targets[anchor.node].lane(anchor.lane);
+        [0, 1, 2].map(|axis| {
+            let moved: f64 = (0..3).map(|k| weights[k] * anchor.segment[k][axis]).sum();
+            anchor.start[axis] + moved - target[axis]
+        })
     }
 }

@@ -1,4 +1,4 @@
-//! `fabrig bench`: measurements that the documentation quotes.
+//! `fabrig bench chain`: what the whole chain loses, shape by shape.
 
 use std::sync::Arc;
 
@@ -7,18 +7,10 @@ use fabrig_core::pipeline::RigFaceOptions;
 use fabrig_core::scene::{Scene, ShapeLoss, chain_loss};
 use fabrig_core::template;
 
-use super::{Outcome, bench_registration, rig};
-use crate::cli::BenchCommand;
+use crate::commands::{Outcome, rig};
 use crate::console::Console;
 
-pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> {
-    match command {
-        BenchCommand::Chain { cloth, json } => chain(console, *cloth, *json),
-        BenchCommand::Registration(args) => bench_registration::run(console, args),
-    }
-}
-
-fn chain(console: &Console, cloth: bool, json: bool) -> Result<Outcome> {
+pub(crate) fn run(console: &Console, cloth: bool, json: bool) -> Result<Outcome> {
     let template = template::human();
     let rigged = rig::rig(console, &template.skin, &RigFaceOptions::default())?;
     let scene = if cloth {

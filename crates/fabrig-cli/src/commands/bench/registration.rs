@@ -11,8 +11,8 @@ use fabrig_core::registration::bench::{
 };
 use fabrig_core::template;
 
-use super::Outcome;
 use crate::cli::BenchRegistrationArgs;
+use crate::commands::Outcome;
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &BenchRegistrationArgs) -> Result<Outcome> {

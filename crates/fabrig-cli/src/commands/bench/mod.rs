@@ -1,0 +1,25 @@
+//! `fabrig bench`: measurements that the documentation quotes, one file each.
+
+mod chain;
+mod demo_scene;
+mod pareto;
+mod plot;
+mod registration;
+mod runtime;
+mod stability;
+
+use anyhow::Result;
+
+use super::Outcome;
+use crate::cli::BenchCommand;
+use crate::console::Console;
+
+pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> {
+    match command {
+        BenchCommand::Chain { cloth, json } => chain::run(console, *cloth, *json),
+        BenchCommand::Registration(args) => registration::run(console, args),
+        BenchCommand::Pareto(args) => pareto::run(console, args),
+        BenchCommand::Runtime(args) => runtime::run(console, args),
+        BenchCommand::Stability(args) => stability::run(console, args),
+    }
+}

@@ -1,0 +1,45 @@
+//! A face on its take as a scene for the cloth's benchmarks.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::simulation::{Simulation, cloth_patches};
+use super::{Scene, SceneError};
+use crate::cloth::bench::BenchScene;
+use crate::motion::Clip;
+use crate::rig::Rig;
+
+/// What the cloth of `rig` is told in the frames of `range` (counted from the take's start, at
+/// `fps` a second), under the head's motion, gravity and wind of `scene`.
+///
+/// # Errors
+///
+/// [`SceneError`] where the rig does not fit the scene.
+pub fn face_bench_scene(
+    rig: &Arc<Rig>,
+    clip: &Clip,
+    scene: &Scene,
+    fps: f64,
+    range: Range<usize>,
+) -> Result<BenchScene, SceneError> {
+    let placed = Scene {
+        dynamics: super::Dynamics::None,
+        ..scene.clone()
+    };
+    let start = clip.times()[0] + range.start as f64 / fps;
+    let dt = 1.0 / fps;
+    let mut simulation = Simulation::new(Arc::clone(rig), placed, Some(clip.clone()))?;
+    let pose = simulation.pose_at(start);
+    simulation.reset(pose)?;
+    let mut frames = vec![simulation.cloth_frame(dt)];
+    for frame in 1..=range.len() {
+        let pose = simulation.pose_at(start + frame as f64 * dt);
+        simulation.pose_to(pose)?;
+        frames.push(simulation.cloth_frame(dt));
+    }
+    Ok(BenchScene::new(
+        &format!("frames {} to {} of the take", range.start, range.end),
+        cloth_patches(rig)?,
+        frames,
+    ))
+}
