@@ -2,8 +2,7 @@
 //!
 //! The user's own mesh is never changed; maps lead from its vertices to the clean copy.
 
-use std::collections::BTreeMap;
-
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::{Components, Mesh, Topology};
@@ -71,23 +70,17 @@ pub(super) fn clean(mesh: &Mesh) -> CleanMesh {
     report.welded_vertices = mesh.vertex_count() - positions.len();
 
     let mut triangles: Vec<[u32; 3]> = Vec::new();
-    let mut seen = std::collections::BTreeSet::new();
     for t in mesh.triangles() {
         let t = t.map(|v| from_user[v as usize]);
         let [a, b, c] = t.map(|v| positions[v as usize]);
         let longest = (b - a).norm_squared().max((c - a).norm_squared());
         if (b - a).cross(&(c - a)).norm() <= 1e-9 * longest {
             report.degenerate_triangles += 1;
-            continue;
-        }
-        let mut key = t;
-        key.sort_unstable();
-        if seen.insert(key) {
-            triangles.push(t);
         } else {
-            report.duplicate_triangles += 1;
+            triangles.push(t);
         }
     }
+    report.duplicate_triangles = drop_duplicates(&mut triangles);
 
     let topology = Topology::from_triangles(positions.len(), &triangles);
     report.non_manifold_edges = topology.edges().iter().filter(|e| e.face_count > 2).count();
@@ -125,6 +118,30 @@ pub(super) fn clean(mesh: &Mesh) -> CleanMesh {
     }
 }
 
+/// Keeps the first of triangles with the same corners; returns how many others there were.
+fn drop_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
+    let mut keys: Vec<([u32; 3], u32)> = triangles
+        .iter()
+        .enumerate()
+        .map(|(k, t)| {
+            let mut key = *t;
+            key.sort_unstable();
+            (key, k as u32)
+        })
+        .collect();
+    keys.par_sort_unstable();
+    let mut is_kept = vec![true; triangles.len()];
+    for run in keys.chunk_by(|a, b| a.0 == b.0) {
+        for &(_, k) in &run[1..] {
+            is_kept[k as usize] = false;
+        }
+    }
+    let before = triangles.len();
+    let mut kept = is_kept.iter();
+    triangles.retain(|_| kept.next() == Some(&true));
+    before - triangles.len()
+}
+
 /// Merges vertices at the same place, up to a millionth of the mesh's size: exporters split
 /// vertices at texture seams.
 fn weld(mesh: &Mesh) -> (Vec<Point>, Vec<u32>) {
@@ -136,18 +153,33 @@ fn weld(mesh: &Mesh) -> (Vec<Point>, Vec<u32>) {
     }
     let size = (high - low).amax();
     let step = if size > 0.0 { size * 1e-6 } else { 1.0 };
-    let mut at: BTreeMap<[i64; 3], u32> = BTreeMap::new();
-    let mut welded = Vec::new();
-    let from_user = positions
+    // Sorted by place and then by index: the first of each run stands for it.
+    let mut keys: Vec<([i64; 3], u32)> = positions
         .iter()
-        .map(|p| {
+        .enumerate()
+        .map(|(v, p)| {
             let key = [0, 1, 2].map(|k| ((p[k] - low[k]) / step).round() as i64);
-            *at.entry(key).or_insert_with(|| {
-                welded.push(*p);
-                welded.len() as u32 - 1
-            })
+            (key, v as u32)
         })
         .collect();
+    keys.par_sort_unstable();
+    let mut first: Vec<u32> = vec![0; positions.len()];
+    for run in keys.chunk_by(|a, b| a.0 == b.0) {
+        for &(_, v) in run {
+            first[v as usize] = run[0].1;
+        }
+    }
+    // Numbered in the order of the user's mesh; the first of a run comes before the others.
+    let mut welded = Vec::new();
+    let mut from_user = vec![0; positions.len()];
+    for v in 0..positions.len() {
+        from_user[v] = if first[v] as usize == v {
+            welded.push(positions[v]);
+            welded.len() as u32 - 1
+        } else {
+            from_user[first[v] as usize]
+        };
+    }
     (welded, from_user)
 }
 
