@@ -59,6 +59,24 @@ impl Unit {
     }
 }
 
+/// Order of a detector's points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Order {
+    /// 68 points of iBUG 300-W and dlib
+    Ibug68,
+    /// 468 or 478 points of MediaPipe
+    Mediapipe,
+}
+
+/// What can be cut apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Seam {
+    /// The lips
+    Mouth,
+    /// The lids of both eyes
+    Eyes,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RigArgs {
     /// Neutral face or head: OBJ, PLY, STL or glTF
@@ -66,15 +84,28 @@ pub(crate) struct RigArgs {
     /// Where to write the rig
     #[arg(short, long, value_name = "FACE.fabrig")]
     pub(crate) output: PathBuf,
-    /// JSON of landmark name to [x, y, z] in the mesh's own units
-    #[arg(long, value_name = "JSON")]
+    /// Landmarks in the mesh's own units: a JSON of name to [x, y, z], or points as a detector
+    /// gives them (JSON array, CSV or .pts)
+    #[arg(long, value_name = "FILE")]
     pub(crate) landmarks: Option<PathBuf>,
+    /// Order of points without names [default: by their count]
+    #[arg(long, value_enum, value_name = "ORDER", requires = "landmarks")]
+    pub(crate) landmarks_order: Option<Order>,
     /// Unit of the mesh; without it the face is scaled by the distance of its eyes
     #[arg(long, value_enum)]
     pub(crate) unit: Option<Unit>,
+    /// Cut lips or lids apart that are one fused surface; what is new follows the mesh's vertices
+    #[arg(long, value_enum, value_name = "OPENING", value_delimiter = ',')]
+    pub(crate) cut_seams: Vec<Seam>,
+    /// Also write the mesh that the rig moves: the face with its cuts, in its own units
+    #[arg(long, value_name = "OUT.obj")]
+    pub(crate) skin: Option<PathBuf>,
     /// Also write the face in the template's topology, in millimetres
     #[arg(long, value_name = "OUT.obj")]
     pub(crate) normalized: Option<PathBuf>,
+    /// Also write the report with pictures: input, fitted template, error in colour
+    #[arg(long, value_name = "OUT.html|OUT.png")]
+    pub(crate) report: Option<PathBuf>,
     /// Print the report as JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -14,6 +14,8 @@ pub enum Error {
     #[error(transparent)]
     Registration(#[from] crate::registration::RegistrationError),
     #[error(transparent)]
+    LandmarkFile(#[from] crate::registration::LandmarkFileError),
+    #[error(transparent)]
     Anatomy(#[from] crate::anatomy::AnatomyError),
     #[error(transparent)]
     Transfer(#[from] crate::transfer::TransferError),

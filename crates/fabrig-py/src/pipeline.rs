@@ -22,15 +22,20 @@ use crate::simulation::scene;
 /// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists
 /// - `landmarks`: name -> (x, y, z) in the mesh's own units
 /// - `unit_mm`: millimetres per unit, where it is known
+/// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
+///   vertices follow those given
 /// - `progress`: called with (stage, share)
 #[pyfunction]
-#[pyo3(signature = (vertices, faces, *, landmarks=None, unit_mm=None, progress=None))]
+#[pyo3(signature = (
+    vertices, faces, *, landmarks=None, unit_mm=None, cut_seams=None, progress=None
+))]
 pub(crate) fn rig(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
     faces: &Bound<'_, PyAny>,
     landmarks: Option<BTreeMap<String, [f64; 3]>>,
     unit_mm: Option<f64>,
+    cut_seams: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
     let positions = arrays::points("vertices", vertices)?;
@@ -38,6 +43,17 @@ pub(crate) fn rig(
     let face = Mesh::new(positions, polygons).map_err(to_py)?;
     let mut options = RigFaceOptions::default();
     options.registration.unit_mm = unit_mm;
+    for name in cut_seams.unwrap_or_default() {
+        match name.as_str() {
+            "mouth" => options.cut_seams.mouth = true,
+            "eyes" => options.cut_seams.eyes = true,
+            other => {
+                return Err(input(format!(
+                    "cut_seams: expected 'mouth' or 'eyes', got '{other}'"
+                )));
+            }
+        }
+    }
     options.registration.landmarks = landmarks
         .unwrap_or_default()
         .into_iter()

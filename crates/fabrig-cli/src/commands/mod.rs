@@ -6,6 +6,7 @@ mod demo;
 mod info;
 mod pose;
 mod render;
+mod report;
 mod rig;
 mod subjects;
 mod template;

@@ -1,36 +1,49 @@
 //! `fabrig rig`: a mesh becomes a rig.
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
-use fabrig_core::Point;
+use anyhow::{Context, Result};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::{read_mesh, write_obj};
 use fabrig_core::pipeline::{RigFaceOptions, RiggedFace, rig_face};
-use fabrig_core::registration::{DistanceStatistics, OpeningMeasure, OpeningState};
+use fabrig_core::registration::{CutSeams, DistanceStatistics, LandmarkOrder, read_landmarks};
 use fabrig_core::template;
 
-use super::{Outcome, check_output};
-use crate::cli::RigArgs;
+use super::{Outcome, check_output, report};
+use crate::cli::{Order, RigArgs, Seam};
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
     check_output(&args.output)?;
-    if let Some(path) = &args.normalized {
+    for path in [&args.normalized, &args.skin, &args.report]
+        .into_iter()
+        .flatten()
+    {
         check_output(path)?;
     }
     let mut options = RigFaceOptions::default();
     options.registration.unit_mm = args.unit.map(crate::cli::Unit::millimetres);
     if let Some(path) = &args.landmarks {
-        options.registration.landmarks = read_landmarks(path)?;
+        let order = args.landmarks_order.map(|order| match order {
+            Order::Ibug68 => LandmarkOrder::Ibug68,
+            Order::Mediapipe => LandmarkOrder::MediaPipe,
+        });
+        options.registration.landmarks = read_landmarks(path, order)?;
     }
+    options.cut_seams = CutSeams {
+        mouth: args.cut_seams.contains(&Seam::Mouth),
+        eyes: args.cut_seams.contains(&Seam::Eyes),
+    };
     let face = read_mesh(&args.face)?;
     let rigged = rig(console, &face, &options)
         .with_context(|| format!("{} was not rigged", args.face.display()))?;
     rigged.rig.save(&args.output)?;
     if let Some(path) = &args.normalized {
         write_obj(path, &rigged.normalized)?;
+    }
+    if let Some(path) = &args.report {
+        report::write(path, &args.face, &rigged)?;
+    }
+    if let Some(path) = &args.skin {
+        write_obj(path, &rigged.rig.face)?;
     }
     if args.json {
         console.result(&serde_json::to_string_pretty(&rigged.report)?);
@@ -93,14 +106,32 @@ pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
         ("left eye", &report.openings.eyes[0]),
         ("right eye", &report.openings.eyes[1]),
     ] {
-        line(name, opening_text(opening));
+        line(name, super::report::opening_text(opening));
+    }
+    for cut in &report.cuts {
+        line(
+            "cut",
+            format!(
+                "{}, {:.1} mm long; from vertex {} on: {} on the cut, {} of lining, {} of an \
+                 eyeball; {} polygons split",
+                cut.opening,
+                cut.length_mm,
+                cut.first_new_vertex,
+                cut.seam_vertices,
+                cut.lining_vertices,
+                cut.eyeball_vertices,
+                cut.split_faces
+            ),
+        );
     }
     line(
         "quality",
         format!(
-            "coverage {:.1} %, {} folded triangles, triangle quality min {:.2} median {:.2}",
+            "coverage {:.1} %, {} folded triangles, {} self-intersections, triangle quality min {:.2} \
+             median {:.2}",
             100.0 * report.coverage,
             report.folded_triangles,
+            report.self_intersections,
             report.triangle_quality[0],
             report.triangle_quality[2]
         ),
@@ -118,39 +149,4 @@ pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
     for warning in &report.warnings {
         line("note", warning.clone());
     }
-}
-
-fn opening_text(opening: &OpeningMeasure) -> String {
-    let state = match opening.state {
-        OpeningState::Open => "open",
-        OpeningState::Closed => "closed",
-        OpeningState::Fused => "fused",
-    };
-    let inside = match opening.inside_mm {
-        Some(mm) => format!("{mm:.1} mm of surface behind the seam"),
-        None => "nothing joins the sides".to_owned(),
-    };
-    format!(
-        "{state}, gap {:.1} mm, {inside}; seam off by median {:.2}  95% {:.2} mm",
-        opening.gap_mm, opening.seam.median, opening.seam.p95
-    )
-}
-
-/// Landmarks from a JSON object of name -> [x, y, z].
-fn read_landmarks(path: &Path) -> Result<BTreeMap<String, Point>> {
-    let text =
-        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let landmarks: BTreeMap<String, [f64; 3]> = serde_json::from_str(&text).with_context(|| {
-        format!(
-            "{} is not a JSON object of landmark name to [x, y, z]",
-            path.display()
-        )
-    })?;
-    if landmarks.is_empty() {
-        bail!("{} names no landmarks", path.display());
-    }
-    Ok(landmarks
-        .into_iter()
-        .map(|(name, position)| (name, Point::from(position)))
-        .collect())
 }

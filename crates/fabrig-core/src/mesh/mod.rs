@@ -5,6 +5,8 @@ pub mod io;
 mod laplacian;
 mod normals;
 mod polygon_mesh;
+mod self_intersection;
+mod slit;
 mod surface;
 mod topology;
 
@@ -12,5 +14,7 @@ pub use components::Components;
 pub use laplacian::{EdgeLaplacian, vertex_areas};
 pub use normals::{triangle_normals, vertex_normals};
 pub use polygon_mesh::{CornerUvs, FaceGroup, Mesh, MeshError, Polygons};
+pub use self_intersection::self_intersections;
+pub use slit::{SlitField, SlitMesh, VertexOrigin, slit};
 pub use surface::{RayHit, Surface, SurfaceError, SurfacePoint, closest_on_triangle};
 pub use topology::{Edge, Topology};

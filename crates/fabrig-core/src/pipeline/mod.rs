@@ -27,5 +27,5 @@ mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
 pub use cost::{CostRow, cost};
-pub use rig_face::{RigFaceOptions, RiggedFace, rig_face};
+pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use timing::TimeStatistics;

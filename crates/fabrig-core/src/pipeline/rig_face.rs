@@ -4,8 +4,10 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use crate::Error;
-use crate::mesh::Mesh;
-use crate::registration::{Progress, RegistrationOptions, RegistrationReport, StageTime, register};
+use crate::mesh::{Mesh, VertexOrigin};
+use crate::registration::{
+    CutSeams, Progress, RegistrationOptions, RegistrationReport, StageTime, cut_seams, register,
+};
 use crate::rig::{FaceOnTemplate, Rig, RigOptions, build};
 use crate::template::Template;
 
@@ -14,6 +16,8 @@ use crate::template::Template;
 pub struct RigFaceOptions {
     /// How it is registered to the template.
     pub registration: RegistrationOptions,
+    /// Fused lips and lids to cut apart; nothing is cut that is not asked for.
+    pub cut_seams: CutSeams,
     /// How the rig is built on it.
     pub rig: RigOptions,
 }
@@ -25,8 +29,21 @@ pub struct RiggedFace {
     pub rig: Rig,
     /// The face in the template's topology, in the head frame. (mm)
     pub normalized: Mesh,
+    /// Where the vertices and polygons of a cut mesh come from, if anything was cut.
+    pub cut: Option<CutOrigins>,
     /// What registration measured; the time of building the rig is its last stage.
     pub report: RegistrationReport,
+}
+
+/// Where the vertices and polygons of a cut mesh come from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutOrigins {
+    /// How many vertices the user's mesh had; they kept their indices.
+    pub original_vertex_count: usize,
+    /// For each further vertex its place on the user's mesh, `None` for lining and eyeballs.
+    pub vertices: Vec<Option<VertexOrigin>>,
+    /// For each polygon that of the user's mesh, `None` for lining and eyeballs.
+    pub faces: Vec<Option<u32>>,
 }
 
 /// Share of the work that registration is.
@@ -59,6 +76,20 @@ pub fn rig_face(
         return Err(crate::registration::RegistrationError::Cancelled { stage: "build" }.into());
     }
     let clock = Instant::now();
+    let mut registration = registration;
+    let mut cut_mesh = None;
+    let mut origins = None;
+    if !options.cut_seams.is_none() {
+        let cut = cut_seams(face, template, &registration, options.cut_seams)?;
+        registration = cut.registration;
+        origins = Some(CutOrigins {
+            original_vertex_count: cut.original_vertex_count,
+            vertices: cut.vertex_origins,
+            faces: cut.face_origins,
+        });
+        cut_mesh = Some(cut.mesh);
+    }
+    let face = cut_mesh.as_ref().unwrap_or(face);
     let normalized = template
         .skin
         .with_positions(registration.positions.clone())?;
@@ -79,6 +110,7 @@ pub fn rig_face(
     Ok(RiggedFace {
         rig,
         normalized,
+        cut: origins,
         report,
     })
 }

@@ -91,6 +91,17 @@ pub enum RegistrationError {
         /// What is allowed.
         expected: &'static str,
     },
+    /// A fused opening on which no line from corner to corner was found.
+    #[error(
+        "the {opening} cannot be cut: no line from corner to corner was found on the mesh; give          landmarks of its corners, or leave it out of the cut"
+    )]
+    SeamNotFound {
+        /// Which.
+        opening: &'static str,
+    },
+    /// A cut did not leave a valid mesh.
+    #[error("the cut mesh is not valid")]
+    Mesh(#[from] crate::mesh::MeshError),
     /// A mesh that no surface can be made of.
     #[error("the mesh has no usable surface")]
     Surface(#[from] SurfaceError),

@@ -46,6 +46,29 @@ pub(super) enum OpeningKind {
 impl OpeningKind {
     pub(super) const ALL: [Self; 3] = [Self::Mouth, Self::LeftEye, Self::RightEye];
 
+    /// Name in reports.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Mouth => "mouth",
+            Self::LeftEye => "left_eye",
+            Self::RightEye => "right_eye",
+        }
+    }
+
+    /// Name in sentences.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Mouth => "mouth",
+            Self::LeftEye => "left eye",
+            Self::RightEye => "right eye",
+        }
+    }
+
+    /// Number of one of its two sides.
+    pub(super) fn side(self, is_upper: bool) -> u8 {
+        2 * self as u8 + u8::from(!is_upper)
+    }
+
     /// Region names: upper side, lower side, inside.
     pub(super) fn regions(self) -> [&'static str; 3] {
         match self {
@@ -126,6 +149,11 @@ impl<'a> FaceModel<'a> {
 
     pub(super) fn positions(&self) -> &[Point] {
         self.template.skin.positions()
+    }
+
+    /// Whether a vertex lies inside mouth, socket or nostril.
+    pub(super) fn is_hidden(&self, vertex: u32) -> bool {
+        self.roles[vertex as usize] == Role::Hidden
     }
 
     /// Region of a vertex.

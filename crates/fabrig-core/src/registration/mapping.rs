@@ -19,7 +19,7 @@ use crate::{Point, Vector};
 const DOUBT_MM: f64 = 3.0;
 
 /// A side of an opening: opening index * 2 for the upper one, + 1 for the lower one.
-type Side = u8;
+pub(super) type Side = u8;
 
 /// Maps every vertex of `face`, whose vertices lie at `positions` in the head frame and face
 /// along `normals`, to the template at `registered`.
@@ -32,20 +32,7 @@ pub(super) fn map_vertices(
 ) -> Result<(Vec<SurfacePoint>, Vec<RegionId>), RegistrationError> {
     let surface = Surface::new(registered, &model.triangles)?;
     let template_normals = vertex_normals(registered, &model.triangles);
-    let vertex_sides = vertex_sides(model);
-    // The side of a triangle is that of most of its corners.
-    let triangle_sides: Vec<Option<Side>> = model
-        .triangles
-        .iter()
-        .map(|t| {
-            let s = t.map(|v| vertex_sides[v as usize]);
-            if s[0] == s[1] || s[0] == s[2] {
-                s[0]
-            } else {
-                s[1].filter(|_| s[1] == s[2])
-            }
-        })
-        .collect();
+    let triangle_sides = triangle_sides(model);
     let closest = |v: usize, refused: Option<Side>| {
         let n = normals[v];
         let accept = |at: &SurfacePoint| {
@@ -100,6 +87,23 @@ pub(super) fn map_vertices(
     Ok((places, regions))
 }
 
+/// Side of every template triangle: that of most of its corners.
+pub(super) fn triangle_sides(model: &FaceModel<'_>) -> Vec<Option<Side>> {
+    let vertex_sides = vertex_sides(model);
+    model
+        .triangles
+        .iter()
+        .map(|t| {
+            let s = t.map(|v| vertex_sides[v as usize]);
+            if s[0] == s[1] || s[0] == s[2] {
+                s[0]
+            } else {
+                s[1].filter(|_| s[1] == s[2])
+            }
+        })
+        .collect()
+}
+
 /// Side of every template vertex: lips, lids and the parts of the mouth behind each lip.
 fn vertex_sides(model: &FaceModel<'_>) -> Vec<Option<Side>> {
     let regions = &model.template.regions;
@@ -107,13 +111,12 @@ fn vertex_sides(model: &FaceModel<'_>) -> Vec<Option<Side>> {
         .regions
         .iter()
         .map(|r| {
-            OpeningKind::ALL.iter().enumerate().find_map(|(k, kind)| {
+            OpeningKind::ALL.iter().find_map(|kind| {
                 let [upper, lower, inside] = kind.regions();
-                let k = 2 * k as u8;
                 if r.name == upper || r.name == format!("{inside}_upper") {
-                    Some(k)
+                    Some(kind.side(true))
                 } else if r.name == lower || r.name == format!("{inside}_lower") {
-                    Some(k + 1)
+                    Some(kind.side(false))
                 } else {
                     None
                 }

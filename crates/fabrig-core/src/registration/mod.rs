@@ -13,14 +13,17 @@
 //! # Limits
 //!
 //! Lips and lids that are one closed surface have no contact line to match; the report says so
-//! (`openings`). One face a mesh; hair that hides the face is taken for skin.
+//! (`openings`), and [`cut_seams`] cuts them on request. One face a mesh; hair that hides the face is taken for skin.
 
 mod alignment;
 pub mod bench;
 mod clean;
 mod closest_grid;
+mod cut;
 mod error;
 mod face_model;
+mod landmarks;
+mod lining;
 mod mapping;
 mod node_graph;
 mod nonrigid_icp;
@@ -36,7 +39,9 @@ mod sparse;
 mod target;
 
 pub use clean::{CleaningReport, Sphere};
+pub use cut::{CutFace, CutSeams, SeamCut, cut_seams};
 pub use error::RegistrationError;
+pub use landmarks::{LandmarkFileError, LandmarkOrder, parse_landmarks, read_landmarks};
 pub use parts::RigidComponent;
 pub use register::{Progress, Registration, RegistrationOptions, register};
 pub use report::{

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clean::CleanMesh;
 use super::face_model::{FaceModel, OpeningKind};
+use crate::mesh::Mesh;
 use crate::template::RigidBody;
 use crate::{Point, Vector};
 
@@ -84,6 +85,30 @@ fn eye_centers(model: &FaceModel<'_>, registered: &[Point]) -> Vec<(RigidBody, P
         }
     }
     eyes
+}
+
+/// The template's eyeball, placed behind the registered lids of `kind`. (mm)
+pub(super) fn eyeball(
+    model: &FaceModel<'_>,
+    registered: &[Point],
+    kind: OpeningKind,
+) -> Option<(RigidBody, Mesh)> {
+    let (body, eye) = match kind {
+        OpeningKind::Mouth => return None,
+        OpeningKind::LeftEye => (RigidBody::EyeLeft, &model.template.eyes[0]),
+        OpeningKind::RightEye => (RigidBody::EyeRight, &model.template.eyes[1]),
+    };
+    let (_, center, _) = eye_centers(model, registered)
+        .into_iter()
+        .find(|e| e.0 == body)?;
+    let part = model
+        .template
+        .rigid_parts
+        .iter()
+        .find(|p| p.follows == body)?;
+    let shift = center - eye.center;
+    let positions = part.mesh.positions().iter().map(|p| p + shift).collect();
+    Some((body, part.mesh.with_positions(positions).ok()?))
 }
 
 /// Where the face's eyes are, left first: the middles of its eyeballs where it has them, else

@@ -249,8 +249,10 @@ pub fn register(
         landmarks: landmark_distances,
         coverage: measures.coverage,
         folded_triangles: measures.folded_triangles,
+        self_intersections: measures.self_intersections,
         triangle_quality: measures.triangle_quality,
         openings,
+        cuts: Vec::new(),
         times: std::mem::take(&mut clock.times),
         warnings,
     };

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::clean::CleaningReport;
+use super::cut::SeamCut;
 use super::face_model::{FaceModel, Role};
 use super::target::Target;
-use crate::mesh::{Surface, SurfaceError, triangle_normals, vertex_normals};
+use crate::mesh::{Surface, SurfaceError, self_intersections, triangle_normals, vertex_normals};
 use crate::{Point, Vector};
 
 /// Distances of a set of points. (mm)
@@ -118,10 +119,17 @@ pub struct RegistrationReport {
     pub coverage: f64,
     /// Triangles of the template's face that turned against their surroundings.
     pub folded_triangles: usize,
+    /// Pairs of triangles of the registered face that pass through each other and do not on the
+    /// template itself.
+    #[serde(default)]
+    pub self_intersections: usize,
     /// Smallest, 5 % and median quality of the face's triangles, 1 = equilateral, 0 = no area.
     pub triangle_quality: [f64; 3],
     /// Lips and lids: whether they can part, and how well their seams were met.
     pub openings: OpeningMeasures,
+    /// What was cut open, on request.
+    #[serde(default)]
+    pub cuts: Vec<SeamCut>,
     /// Time of each stage.
     pub times: Vec<StageTime>,
     /// What a person should know, one sentence each.
@@ -151,6 +159,7 @@ pub(super) struct Measures {
     pub(super) face_to_template: DistanceStatistics,
     pub(super) coverage: f64,
     pub(super) folded_triangles: usize,
+    pub(super) self_intersections: usize,
     pub(super) triangle_quality: [f64; 3],
 }
 
@@ -220,8 +229,24 @@ pub(super) fn measure(
         face_to_template: DistanceStatistics::from_distances(back),
         coverage: if total > 0.0 { covered / total } else { 0.0 },
         folded_triangles: folded_triangles(model, registered).len(),
+        self_intersections: new_self_intersections(model, registered),
         triangle_quality: [at(0.0), at(0.05), at(0.5)],
     })
+}
+
+/// Pairs of the face's triangles that pass through each other here and not on the template.
+fn new_self_intersections(model: &FaceModel<'_>, registered: &[Point]) -> usize {
+    let face: Vec<[u32; 3]> = model
+        .triangles
+        .iter()
+        .filter(|t| is_face_triangle(model, t))
+        .copied()
+        .collect();
+    let own = self_intersections(model.positions(), &face);
+    self_intersections(registered, &face)
+        .iter()
+        .filter(|pair| own.binary_search(pair).is_err())
+        .count()
 }
 
 fn is_face_triangle(model: &FaceModel<'_>, t: &[u32; 3]) -> bool {

@@ -1,4 +1,5 @@
 //! Faces whose lips and lids are sewn shut: what scans of closed faces look like.
+#![allow(dead_code)]
 
 use std::collections::BTreeSet;
 

@@ -164,6 +164,7 @@ def rig(
     *,
     landmarks: Mapping[str, Sequence[float]] | None = None,
     unit_mm: float | None = None,
+    cut_seams: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Rig: ...
 def animate(
