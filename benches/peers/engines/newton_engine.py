@@ -28,6 +28,8 @@ class Engine:
             [wp.vec3(*p) for p in places.tolist()],
             [wp.vec3(0.0, 0.0, 0.0)] * len(places),
             mass.tolist(),
+            # No contact: with the default radius neighbours push each other away.
+            radius=[1e-6] * len(places),
         )
         for pairs, stiffness in springs:
             for a, b in pairs.tolist():
@@ -64,6 +66,8 @@ class Engine:
 
 
 def _semi_implicit(model):
+    # No contact is asked for, and looking for it would cost more than the rest.
+    model.particle_grid = None
     return newton.solvers.SolverSemiImplicit(model)
 
 
