@@ -22,6 +22,11 @@ pub(crate) enum Command {
     Animate(AnimateArgs),
     /// Rig and animate the bundled face with the bundled take
     Demo(DemoArgs),
+    /// Fit the shapes of a rig to markers or an animated mesh, and write the take
+    Retarget(RetargetArgs),
+    /// Look at and change single muscles of a rig
+    #[command(subcommand)]
+    Edit(EditCommand),
     /// Draw a mesh, a rig or a recording to PNG or GIF
     Render(RenderArgs),
     /// Say what is in a mesh, a rig, a take or a recording
@@ -244,6 +249,72 @@ pub(crate) struct AnimateArgs {
     pub(crate) take: TakeArgs,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RetargetArgs {
+    /// Markers as C3D or TRC; or the rig's own mesh in motion: a folder of OBJ files, or .npy
+    /// with shape (frames, vertices, 3)
+    pub(crate) source: PathBuf,
+    /// Rig of the face that the source shows
+    #[arg(long, value_name = "FACE.fabrig")]
+    pub(crate) rig: PathBuf,
+    /// Where to write the take, a CSV of ARKit's shapes
+    #[arg(short, long, value_name = "TAKE.csv")]
+    pub(crate) output: PathBuf,
+    /// Fit FACS action units instead of the shapes one by one: numbers with commas between
+    #[arg(long, value_name = "1,2,4,...", value_delimiter = ',')]
+    pub(crate) units: Vec<u32>,
+    /// When the markers' face is neutral: the first SECS, or FROM..TO
+    #[arg(long, value_name = "SECS", default_value = "0.2", value_parser = parse_stretch)]
+    pub(crate) neutral: [f64; 2],
+    /// JSON of marker name to the name of the landmark it stands at, three or more
+    #[arg(long, value_name = "JSON")]
+    pub(crate) places: Option<PathBuf>,
+    /// Frames per second of an animated mesh
+    #[arg(long, value_name = "FPS", default_value_t = 30.0)]
+    pub(crate) source_fps: f64,
+    /// The source is without head motion
+    #[arg(long)]
+    pub(crate) still_head: bool,
+    /// Noise of the source's coordinates in mm: more is smoother [default: 0.5 for markers,
+    /// 0.01 for a mesh]
+    #[arg(long, value_name = "MM")]
+    pub(crate) noise: Option<f64>,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum EditCommand {
+    /// Names of the muscle shapes, and what FACE.edits.toml changes
+    List {
+        /// Rig, as `fabrig rig` makes it
+        rig: PathBuf,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write one muscle shape as a mesh in millimetres
+    Export {
+        /// Rig, as `fabrig rig` makes it
+        rig: PathBuf,
+        /// Muscle shape, such as zygomaticus_major_l.mouthSmileLeft
+        shape: String,
+        /// Where to write it
+        #[arg(short, long, value_name = "SHAPE.obj")]
+        output: PathBuf,
+    },
+    /// Take a changed mesh of a muscle shape into FACE.edits.toml
+    Import {
+        /// Rig, as `fabrig rig` makes it
+        rig: PathBuf,
+        /// Muscle shape, such as zygomaticus_major_l.mouthSmileLeft
+        shape: String,
+        /// The mesh, vertices as they were exported
+        mesh: PathBuf,
+    },
 }
 
 #[derive(Debug, Args)]

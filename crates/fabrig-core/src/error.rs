@@ -24,9 +24,13 @@ pub enum Error {
     #[error(transparent)]
     Rig(#[from] crate::rig::RigError),
     #[error(transparent)]
+    Edit(#[from] crate::edit::EditError),
+    #[error(transparent)]
     Facs(#[from] crate::facs::FacsError),
     #[error(transparent)]
     Motion(#[from] crate::motion::MotionError),
+    #[error(transparent)]
+    Retarget(#[from] crate::retarget::RetargetError),
     #[error(transparent)]
     Cloth(#[from] crate::cloth::ClothError),
     #[error(transparent)]

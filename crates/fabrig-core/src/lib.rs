@@ -21,6 +21,7 @@
 pub mod anatomy;
 pub mod atomic_file;
 pub mod cloth;
+pub mod edit;
 mod error;
 pub mod facs;
 pub mod mesh;
@@ -30,6 +31,7 @@ pub mod recording;
 pub mod registration;
 #[cfg(feature = "render")]
 pub mod render;
+pub mod retarget;
 pub mod rig;
 pub mod scene;
 pub mod skin;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
+use fabrig_core::edit::{Edits, edits_path};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
 use fabrig_core::rig::Rig;
@@ -34,7 +35,18 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
     Ok(outcome(console, &report))
 }
 
+/// Loads a rig with the edits that stand beside it.
 pub(super) fn load_rig(path: &Path) -> Result<Rig> {
+    let mut rig = load_unedited_rig(path)?;
+    let beside = || format!("{} cannot be used", edits_path(path).display());
+    if let Some(edits) = Edits::beside(path).with_context(beside)? {
+        edits.apply(&mut rig).with_context(beside)?;
+    }
+    Ok(rig)
+}
+
+/// Loads a rig as it was built.
+pub(super) fn load_unedited_rig(path: &Path) -> Result<Rig> {
     Rig::load(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 

@@ -3,10 +3,12 @@
 mod animate;
 mod bench;
 mod demo;
+mod edit;
 mod info;
 mod pose;
 mod render;
 mod report;
+mod retarget;
 mod rig;
 mod subjects;
 mod template;
@@ -35,6 +37,8 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
         Command::Rig(args) => rig::run(console, &args),
         Command::Animate(args) => animate::run(console, &args),
         Command::Demo(args) => demo::run(console, &args),
+        Command::Retarget(args) => retarget::run(console, &args),
+        Command::Edit(command) => edit::run(console, &command),
         Command::Render(args) => render::run(console, &args),
         Command::Info(args) => info::run(console, &args),
         Command::Template(command) => template::run(console, &command),

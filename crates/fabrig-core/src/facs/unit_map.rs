@@ -113,6 +113,16 @@ impl ActionUnitMap {
         })
     }
 
+    /// Whether a unit moves anything by one side alone.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such unit.
+    pub fn has_sides(&self, unit: usize) -> bool {
+        let action = &self.units[unit];
+        !(action.left.is_empty() && action.right.is_empty())
+    }
+
     /// Shapes that the given units can move, correctives of them included, rising.
     pub fn shapes_of(&self, units: &[usize]) -> Vec<usize> {
         let mut shapes: Vec<usize> = Vec::new();

@@ -174,6 +174,14 @@ pub enum MotionError {
         #[source]
         source: crate::facs::FacsError,
     },
+    /// Marker trajectories cannot be read.
+    #[error("{name}: {problem}")]
+    Markers {
+        /// Name of the take.
+        name: String,
+        /// What is wrong, with the line or byte.
+        problem: String,
+    },
     /// Something is asked of a take that it cannot do.
     #[error("{name}: {problem}")]
     Adjust {

@@ -49,3 +49,4 @@ pub use report::{
     StageTime,
 };
 pub use similarity::MIN_LANDMARK_COUNT;
+pub(crate) use similarity::umeyama;

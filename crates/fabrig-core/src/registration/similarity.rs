@@ -29,7 +29,7 @@ const USEFUL_LANDMARKS: [&str; 8] = [
 /// Weighted least-squares similarity that takes `from` to `to`.
 ///
 /// Returns `None` for fewer than three points, points on one line, or weights that sum to zero.
-pub(super) fn umeyama(from: &[Point], to: &[Point], weights: &[f64]) -> Option<Similarity3<f64>> {
+pub(crate) fn umeyama(from: &[Point], to: &[Point], weights: &[f64]) -> Option<Similarity3<f64>> {
     let sum: f64 = weights.iter().sum();
     if from.len() < 3 || sum <= 0.0 {
         return None;

@@ -274,6 +274,7 @@ pub(super) fn transfer_all(
                 shapes,
                 jaw,
                 lids,
+                held: Vec::new(),
             }
         })
         .collect()

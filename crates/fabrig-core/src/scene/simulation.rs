@@ -290,6 +290,11 @@ impl Simulation {
         &self.skin
     }
 
+    /// The user's mesh at rest. [mm, head frame]
+    pub fn rest_skin(&self) -> &[Point3<f32>] {
+        self.deformer.rest()
+    }
+
     /// The user's mesh now, in its own units and place; bit for bit as it was where nothing
     /// moves it.
     pub fn skin_in_own_units(&self) -> Vec<Point> {

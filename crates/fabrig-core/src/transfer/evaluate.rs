@@ -20,10 +20,6 @@ impl ShapeWeights<'_> {
         let i = shape as usize;
         (self.weights[i], self.rates.map_or(0.0, |r| r[i]))
     }
-
-    fn of_optional(&self, shape: Option<u32>) -> (f32, f32) {
-        shape.map_or((0.0, 0.0), |s| self.of(s))
-    }
 }
 
 /// What all patches of a face share.
@@ -50,15 +46,27 @@ pub struct PatchTransfer {
     pub jaw: Option<JawField>,
     /// What it does over an eyeball.
     pub lids: Option<LidField>,
+    /// Shapes that an edit holds on this patch at a weight of its own, whatever the face
+    /// does. Not part of a rig file: edits stand beside it.
+    #[serde(skip)]
+    pub held: Vec<(u32, f32)>,
 }
 
 impl PatchTransfer {
+    /// Weight and rate of a shape on this patch.
+    fn weight_of(&self, shape: u32, at: ShapeWeights<'_>) -> (f32, f32) {
+        match self.held.iter().find(|(held, _)| *held == shape) {
+            Some(&(_, weight)) => (weight, 0.0),
+            None => at.of(shape),
+        }
+    }
+
     /// Evaluates Eq. 3 with the hinge and the lids.
     ///
     /// - `neutral`: b_0 (mm); `positions`: receives X (mm); `velocities`: receives dX/dt
     ///   (mm/s), zero where `at` has no rates. All of one length, the patch's node count.
     ///
-    /// With all weights zero, X equals b_0 bit for bit.
+    /// With all weights zero and no shape held, X equals b_0 bit for bit.
     pub fn evaluate(
         &self,
         context: &TransferContext<'_>,
@@ -74,7 +82,7 @@ impl PatchTransfer {
             .iter()
             .enumerate()
             .map(|(i, s)| {
-                let (weight, rate) = at.of(s.shape);
+                let (weight, rate) = self.weight_of(s.shape, at);
                 (i, weight, rate)
             })
             .filter(|&(_, weight, rate)| weight != 0.0 || rate != 0.0)
@@ -107,8 +115,10 @@ impl PatchTransfer {
             }
         }
         if let Some(jaw) = jaw {
-            let open = at.of_optional(context.jaw_shapes.open);
-            let close = at.of_optional(context.jaw_shapes.close);
+            let weight_of =
+                |shape: Option<u32>| shape.map_or((0.0, 0.0), |shape| self.weight_of(shape, at));
+            let open = weight_of(context.jaw_shapes.open);
+            let close = weight_of(context.jaw_shapes.close);
             if open != (0.0, 0.0) || close != (0.0, 0.0) {
                 turn_with_jaw(
                     jaw,
@@ -244,6 +254,7 @@ mod tests {
                 shapes,
                 jaw,
                 lids,
+                held: Vec::new(),
             },
         }
     }

@@ -1,0 +1,163 @@
+//! The text of edits.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::EditError;
+use crate::atomic_file::write_atomically;
+
+/// Edits of a rig, by name.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Edits {
+    /// By muscle shape: `zygomaticus_major_l.mouthSmileLeft`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub shapes: BTreeMap<String, ShapeEdit>,
+    /// By patch.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub patches: BTreeMap<String, PatchEdit>,
+    /// By material.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<String, MaterialEdit>,
+}
+
+/// What changes about one muscle shape.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeEdit {
+    /// Held at this weight in [0, 1], whatever the face does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<f64>,
+    /// Factor of its displacements, at least 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<f64>,
+    /// Displacement of nodes added to the shape's own, before its strength [mm, head frame];
+    /// keys are node indices, which TOML wants as text.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub moved: BTreeMap<String, [f64; 3]>,
+}
+
+/// What changes about one patch.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PatchEdit {
+    /// Amplitude against the template, alpha of Eq. 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<f64>,
+    /// Name of its material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+}
+
+/// A new material, or changes to one that there is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MaterialEdit {
+    /// The material whose numbers it starts from; its own where it exists already.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub like: Option<String>,
+    /// Numbers by the names of `materials.toml`.
+    #[serde(flatten)]
+    pub numbers: BTreeMap<String, f64>,
+}
+
+/// Where the edits of a rig stand: `face.edits.toml` beside `face.fabrig`.
+pub fn edits_path(rig: &Path) -> PathBuf {
+    rig.with_extension("edits.toml")
+}
+
+impl Edits {
+    /// Reads edits from text.
+    ///
+    /// # Errors
+    ///
+    /// [`EditError::Syntax`]. Whether names exist shows in [`Self::apply`].
+    pub fn parse(text: &str) -> Result<Self, EditError> {
+        toml::from_str(text).map_err(|error| EditError::Syntax {
+            message: error.to_string().trim().replace('\n', " "),
+        })
+    }
+
+    /// Reads edits from a file.
+    ///
+    /// # Errors
+    ///
+    /// [`EditError::Io`], [`EditError::Syntax`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, EditError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| EditError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text)
+    }
+
+    /// The edits beside a rig file; `None` where there are none.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::load`], but for a file that is not there.
+    pub fn beside(rig: impl AsRef<Path>) -> Result<Option<Self>, EditError> {
+        let path = edits_path(rig.as_ref());
+        if path.exists() {
+            Self::load(path).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// As text, in the order of names: equal edits give equal text.
+    ///
+    /// # Errors
+    ///
+    /// [`EditError::Syntax`] for numbers that TOML cannot hold.
+    pub fn to_text(&self) -> Result<String, EditError> {
+        toml::to_string_pretty(self).map_err(|error| EditError::Syntax {
+            message: error.to_string(),
+        })
+    }
+
+    /// Writes the edits to a file; what stood there stays until the new file is whole.
+    ///
+    /// # Errors
+    ///
+    /// [`EditError::Io`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), EditError> {
+        let path = path.as_ref();
+        let text = self.to_text()?;
+        write_atomically(path, |file| file.write_all(text.as_bytes())).map_err(|source| {
+            EditError::Io {
+                path: path.to_owned(),
+                source,
+            }
+        })
+    }
+
+    /// Whether nothing is edited.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_read_and_written() {
+        let text = "[shapes.\"a.b\"]\nstrength = 1.5\n\n[shapes.\"a.b\".moved]\n3 = [0.0, 1.0, 0.0]\n\n\
+                    [patches.a]\nalpha = 1.2\nmaterial = \"soft\"\n\n\
+                    [materials.soft]\nlike = \"fat\"\nmass = 2\n";
+        let edits = Edits::parse(text).unwrap();
+        assert_eq!(edits.shapes["a.b"].moved["3"], [0.0, 1.0, 0.0]);
+        assert_eq!(edits.materials["soft"].numbers["mass"], 2.0);
+        assert_eq!(Edits::parse(&edits.to_text().unwrap()).unwrap(), edits);
+        let error = Edits::parse("[shapes.\"a.b\"]\nstrenght = 1\n").unwrap_err();
+        assert!(error.to_string().contains("strenght"), "{error}");
+        assert_eq!(
+            edits_path(Path::new("x/face.fabrig")),
+            Path::new("x/face.edits.toml")
+        );
+    }
+}

@@ -1,0 +1,36 @@
+//! Edits: what an artist changes on a rig, as a small text file beside it.
+//!
+//! `face.edits.toml` stands beside `face.fabrig` and is applied whenever that is loaded, so
+//! edits outlive the rig being built again. Everything is addressed by name:
+//!
+//! ```toml
+//! [shapes."zygomaticus_major_l.mouthSmileLeft"]
+//! strength = 1.4        # scales the muscle shape; 0 switches it off
+//!
+//! [shapes."frontalis_r.browInnerUp"]
+//! weight = 0.3          # holds it on this muscle, whatever the action units say
+//!
+//! [shapes."risorius_l.mouthStretchLeft".moved]
+//! 118 = [0.0, 0.4, 0.2] # a node is displaced further at weight 1 (mm)
+//!
+//! [patches.malar_fat_l]
+//! alpha = 1.2           # amplitude of all of the patch's shapes, Eq. 3
+//! material = "soft_fat"
+//!
+//! [materials.soft_fat]  # a new material, or changes to one that there is
+//! like = "fat"
+//! bend_resistance = 1.0
+//! ```
+//!
+//! # Source
+//!
+//! Zhu & Joslin 2024, section 4, Fig. 4: edits at the level of single muscles.
+
+mod apply;
+mod error;
+mod file;
+mod muscle_mesh;
+
+pub use error::EditError;
+pub use file::{Edits, MaterialEdit, PatchEdit, ShapeEdit, edits_path};
+pub use muscle_mesh::{export_muscle_shape, import_muscle_shape, muscle_shape_names};
