@@ -31,3 +31,4 @@ rm -rf "$target/wheels"
 "$python" -m maturin build --release -m crates/fabrig-py/Cargo.toml --out "$target/wheels"
 "$python" -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
 "$python" -m pytest -q crates/fabrig-py/tests tests
+"$python" benches/peers/run.py --smoke --json "$target/peers.json"

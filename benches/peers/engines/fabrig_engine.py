@@ -14,8 +14,14 @@ class Engine:
     """One cloth of all sheets."""
 
     def __init__(self, scene, substeps, **options):
+        # Gravity pulls here as it does elsewhere, rather than being part of the rest shape.
         self.cloth = fabrig.Cloth(
-            [1e3 * sheet for sheet in scene.rest], substeps=substeps, rest_imperfection=0.0, **options
+            [1e3 * sheet for sheet in scene.rest],
+            substeps=substeps,
+            rest_blend=0.0,
+            rest_imperfection=0.0,
+            standing_gravity=(0.0, 0.0, 0.0),
+            **options,
         )
         self.rest = [1e3 * sheet for sheet in scene.rest]
         self.gravity = (0.0, -1e3 * scenes.GRAVITY, 0.0)
@@ -47,7 +53,7 @@ def patches(scene, substeps):
         "magnet_frequency_hz": np.sqrt(scenes.MAGNET) / (2 * np.pi),
         "magnet_damping_ratio": 0.0,
     }
-    return Engine(scene, substeps, material=material, rest_blend=0.0)
+    return Engine(scene, substeps, material=material)
 
 
 def hanging(scene, substeps):
@@ -68,8 +74,6 @@ def hanging(scene, substeps):
         scene,
         substeps,
         material=material,
-        rest_blend=0.0,
         anchors=[list(range(scene.side))],
         anchor_strength=1e6,
-        standing_gravity=(0.0, 0.0, 0.0),
     )
