@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use fabrig_core::Point;
+use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::mesh::{Mesh, Surface};
 use fabrig_core::pipeline::RiggedFace;
 use fabrig_core::registration::{DistanceStatistics, OpeningMeasure, OpeningState};
@@ -34,25 +35,11 @@ pub(super) fn write(path: &Path, source: &Path, rigged: &RiggedFace) -> Result<(
         }
         Some("html" | "htm") => {
             let text = page(source, rigged, &pictures)?;
-            write_whole(path, text.as_bytes())?;
+            write_atomically(path, |out| out.write_all(text.as_bytes()))
+                .with_context(|| format!("cannot write {}", path.display()))?;
         }
         _ => bail!("{}: a report is written as .html or .png", path.display()),
     }
-    Ok(())
-}
-
-/// Written beside its place and renamed, so that no half of it is ever left.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let file = tempfile::NamedTempFile::new_in(folder)
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    std::fs::write(file.path(), bytes)
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    file.persist(path)
-        .with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }
 
