@@ -22,6 +22,7 @@ pub mod anatomy;
 pub mod atomic_file;
 pub mod cloth;
 pub mod edit;
+pub mod collision;
 mod error;
 pub mod facs;
 pub mod mesh;

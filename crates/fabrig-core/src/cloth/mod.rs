@@ -52,7 +52,7 @@
 //!
 //! # Limitations
 //!
-//! - No contact.
+//! - No contact of its own: [`Cloth::step_with`] lets contact move nodes in every substep.
 //! - One sweep per substep: the error grows with the ratio of stretch to magnet stiffness (see
 //!   [`Material::stiffness_ratio`]); beyond about 1,000 nothing is promised but finiteness.
 //! - The rest curvature is always that of the target.
@@ -66,6 +66,8 @@ pub mod bench;
 mod constraints;
 mod error;
 mod group;
+mod hook;
+mod hooked;
 mod input;
 mod lanes;
 mod materials;
@@ -78,6 +80,7 @@ mod validate;
 mod tests;
 
 pub use error::ClothError;
+pub use hook::{HookSubstep, SubstepHook};
 pub use input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,
     PatchMotion, Precision, STANDING_GRAVITY,

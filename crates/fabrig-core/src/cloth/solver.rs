@@ -8,6 +8,8 @@ use rayon::prelude::*;
 use super::constraints::attachment::Port;
 use super::error::ClothError;
 use super::group::{Group, GroupPairs, Monitor, Partner, PatchGroup, Substep};
+use super::hook::SubstepHook;
+use super::hooked::{SeenNodes, advance_hooked};
 use super::input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion, Precision,
 };
@@ -61,8 +63,8 @@ pub struct Cloth {
 pub(crate) struct PatchLayout {
     pub(crate) node_count: usize,
     pub(crate) anchor_count: usize,
-    group: usize,
-    lane: usize,
+    pub(super) group: usize,
+    pub(super) lane: usize,
 }
 
 /// Gravity's difference, wind and head motion at the end of a frame.
@@ -178,6 +180,41 @@ impl Cloth {
         anchors: &[PatchMotion],
     ) -> Result<(), ClothError> {
         validate::motions(&self.layout, targets, anchors)?;
+        self.put_on_targets(targets, anchors);
+        self.write_positions();
+        Ok(())
+    }
+
+    /// As [`Cloth::reset`], but `hook` has a say in where nodes start.
+    ///
+    /// # Errors
+    ///
+    /// As [`Cloth::step`].
+    pub fn reset_with(
+        &mut self,
+        targets: &[PatchMotion],
+        anchors: &[PatchMotion],
+        hook: &mut dyn SubstepHook,
+    ) -> Result<(), ClothError> {
+        validate::motions(&self.layout, targets, anchors)?;
+        self.put_on_targets(targets, anchors);
+        let seen = SeenNodes::new(hook.patches(), &self.layout);
+        let mut nodes: Vec<Point3<f32>> = hook
+            .patches()
+            .iter()
+            .flat_map(|&patch| targets[patch].positions.iter().copied())
+            .collect();
+        let wanted = nodes.clone();
+        hook.reset(&mut nodes);
+        seen.for_each(hook.moved(), |at, node, i| {
+            let offset = [0, 1, 2].map(|k| f64::from(nodes[i][k]) - f64::from(wanted[i][k]));
+            self.groups[at.group].place(at.lane, node, offset);
+        });
+        self.write_positions();
+        Ok(())
+    }
+
+    fn put_on_targets(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
         for group in &mut self.groups {
             group.reset(targets, anchors);
         }
@@ -186,8 +223,6 @@ impl Cloth {
         self.energies.fill(Energies::default());
         self.ceilings.fill(0.0);
         self.troubled_frames.fill(0);
-        self.write_positions();
-        Ok(())
     }
 
     /// Moves the cloth through one frame.
@@ -200,6 +235,27 @@ impl Cloth {
     /// [`ClothError`] for counts that do not match, numbers that are not finite, and a time
     /// step that is not positive; the cloth is then unchanged.
     pub fn step(&mut self, input: &FrameInput<'_>) -> Result<StepReport, ClothError> {
+        self.step_hooked(input, None)
+    }
+
+    /// As [`Cloth::step`], with `hook` moving nodes at the end of every substep.
+    ///
+    /// # Errors
+    ///
+    /// As [`Cloth::step`].
+    pub fn step_with(
+        &mut self,
+        input: &FrameInput<'_>,
+        hook: &mut dyn SubstepHook,
+    ) -> Result<StepReport, ClothError> {
+        self.step_hooked(input, Some(hook))
+    }
+
+    fn step_hooked(
+        &mut self,
+        input: &FrameInput<'_>,
+        hook: Option<&mut dyn SubstepHook>,
+    ) -> Result<StepReport, ClothError> {
         validate::frame(&self.layout, input)?;
         let end = Fields::of(input, self.options.standing_gravity);
         let count = self.substep_count(input.dt);
@@ -208,7 +264,22 @@ impl Cloth {
             .collect();
         let (dt, targets, anchors) = (input.dt, input.targets, input.anchors);
         let monitors = &mut self.monitors;
-        if self.has_pairs {
+        if let Some(hook) = hook {
+            self.groups
+                .par_iter_mut()
+                .for_each(|g| g.begin_frame(dt, targets, anchors));
+            advance_hooked(
+                &mut self.groups,
+                &mut self.ports,
+                &substeps,
+                &self.layout,
+                hook,
+            );
+            self.groups
+                .par_iter_mut()
+                .zip(monitors)
+                .for_each(|(g, m)| g.end_frame(m));
+        } else if self.has_pairs {
             self.groups
                 .par_iter_mut()
                 .for_each(|g| g.begin_frame(dt, targets, anchors));

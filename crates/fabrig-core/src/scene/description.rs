@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Point;
 use crate::cloth::{ClothOptions, STANDING_GRAVITY};
+use crate::collision::{Collider, ContactOptions};
 
 /// Whether patches have mass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -47,6 +48,10 @@ pub struct Scene {
     pub neck_pivot: Point,
     /// What turns the eyeballs.
     pub eyes: EyeSource,
+    /// What touches what, and how.
+    pub contact: ContactOptions,
+    /// Things of the world that the face can touch.
+    pub colliders: Vec<Collider>,
 }
 
 impl Default for Scene {
@@ -59,6 +64,8 @@ impl Default for Scene {
             head_motion: true,
             neck_pivot: Point::new(0.0, -45.0, -20.0),
             eyes: EyeSource::default(),
+            contact: ContactOptions::default(),
+            colliders: Vec::new(),
         }
     }
 }

@@ -1,4 +1,5 @@
 use crate::cloth::{ClothError, MaterialError};
+use crate::collision::CollisionError;
 use crate::skin::SkinError;
 use crate::transfer::TransferError;
 
@@ -11,6 +12,9 @@ pub enum SceneError {
         /// What was given.
         dt: f64,
     },
+    /// Contact refused its options or a collider.
+    #[error(transparent)]
+    Collision(#[from] CollisionError),
     /// The cloth refused its input.
     #[error(transparent)]
     Cloth(#[from] ClothError),

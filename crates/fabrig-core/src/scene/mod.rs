@@ -3,6 +3,7 @@
 mod anchors;
 mod bench_face;
 mod chain_loss;
+mod contact;
 mod description;
 mod error;
 mod head;

@@ -11,9 +11,11 @@ use crate::cloth::bench::SceneFrame;
 use crate::cloth::{
     Cloth, ClothAttachment, ClothPatch, FrameInput, HeadMotion, Materials, PatchMotion, StepReport,
 };
+use crate::collision::{CollisionError, ContactPoint, ContactReport, Verdict};
 use crate::motion::{Clip, EyeAngles, Sample};
 use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
+use crate::scene::contact::FaceContact;
 use crate::scene::head::{head_motion, head_to_world};
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
@@ -94,6 +96,7 @@ pub struct Simulation {
     pose: FacePose,
     sample: Sample,
     cloth: Option<Cloth>,
+    contact: Option<FaceContact>,
     evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
@@ -123,6 +126,10 @@ impl Simulation {
             Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
             Dynamics::None => None,
         };
+        let contact = match scene.dynamics {
+            Dynamics::Cloth => FaceContact::new(&rig, &scene, &patches)?,
+            Dynamics::None => None,
+        };
         let skin = rig.skin_at_rest();
         let deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
         let count = rig.patches.len();
@@ -136,6 +143,7 @@ impl Simulation {
             time,
             sample: Sample::default(),
             cloth,
+            contact,
             evaluated: vec![(Vec::new(), Vec::new()); count],
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
@@ -191,8 +199,13 @@ impl Simulation {
     /// [`SceneError`] where weights do not fit the rig.
     pub fn reset(&mut self, pose: FacePose) -> Result<(), SceneError> {
         self.evaluate(pose)?;
-        if let Some(cloth) = &mut self.cloth {
-            cloth.reset(&self.targets, &self.anchors)?;
+        self.begin_contact(self.time);
+        match (&mut self.cloth, &mut self.contact) {
+            (Some(cloth), Some(c)) => {
+                cloth.reset_with(&self.targets, &self.anchors, &mut c.contact)?;
+            }
+            (Some(cloth), None) => cloth.reset(&self.targets, &self.anchors)?,
+            (None, _) => {}
         }
         self.move_skin()
     }
@@ -227,16 +240,21 @@ impl Simulation {
         report.targets_ms = milliseconds(clock);
 
         let clock = Instant::now();
+        self.begin_contact(self.time + dt);
         if let Some(cloth) = &mut self.cloth {
             let to_head = self.pose.head.rotation.inverse();
-            report.step = cloth.step(&FrameInput {
+            let input = FrameInput {
                 dt,
                 targets: &self.targets,
                 anchors: &self.anchors,
                 gravity: Some((to_head * self.scene.gravity.cast::<f64>()).cast()),
                 wind: (to_head * self.pose.wind).cast(),
                 head: self.pose.head_motion,
-            })?;
+            };
+            report.step = match &mut self.contact {
+                Some(c) => cloth.step_with(&input, &mut c.contact)?,
+                None => cloth.step(&input)?,
+            };
         }
         report.cloth_ms = milliseconds(clock);
 
@@ -262,6 +280,52 @@ impl Simulation {
             wind: (to_head * self.pose.wind).cast(),
             head: self.pose.head_motion,
         }
+    }
+
+    /// What contact did in the last frame; none where nothing could touch.
+    pub fn contact_report(&self) -> Option<&ContactReport> {
+        self.contact.as_ref().map(|c| c.contact.report())
+    }
+
+    /// Where things touched at the end of the last frame.
+    pub fn contact_points(&self) -> &[ContactPoint] {
+        self.contact.as_ref().map_or(&[], |c| c.contact.points())
+    }
+
+    /// Where the scene's colliders are. [mm, head frame]
+    pub fn collider_poses(&self) -> &[Isometry3<f64>] {
+        self.contact.as_ref().map_or(&[], |c| c.poses())
+    }
+
+    /// Puts a collider somewhere for the end of the next frame, in place of its keys.
+    ///
+    /// - `pose`: in the collider's own frame (mm)
+    ///
+    /// # Errors
+    ///
+    /// [`CollisionError`] where there is no such collider, or the pose is not a place.
+    pub fn set_collider_pose(
+        &mut self,
+        index: usize,
+        pose: Isometry3<f64>,
+    ) -> Result<(), CollisionError> {
+        match &mut self.contact {
+            Some(c) => c.set_pose(index, pose),
+            None => Err(CollisionError::NoSuchCollider { index, count: 0 }),
+        }
+    }
+
+    /// Tests exactly what crosses what may not, independently of how contact is solved; none
+    /// where nothing could touch.
+    ///
+    /// # Errors
+    ///
+    /// [`CollisionError`] for a collider that cannot be.
+    pub fn judge_contact(&self) -> Result<Option<Verdict>, CollisionError> {
+        self.contact
+            .as_ref()
+            .map(|c| c.judge(|patch| self.patch_positions(patch)))
+            .transpose()
     }
 
     /// The rig.
@@ -396,6 +460,13 @@ impl Simulation {
             anchored.place(&mandible, target, anchors);
         }
         Ok(())
+    }
+
+    fn begin_contact(&mut self, time: f64) {
+        let eyes = [0, 1].map(|e| self.eye(e));
+        if let Some(contact) = &mut self.contact {
+            contact.begin_frame(time, &self.pose.head, eyes);
+        }
     }
 
     fn move_skin(&mut self) -> Result<(), SceneError> {

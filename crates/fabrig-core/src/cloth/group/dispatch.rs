@@ -91,6 +91,49 @@ impl<R: Real> PatchGroup for Group<R> {
         }
     }
 
+    fn set_hooked(&mut self, is_hooked: bool) {
+        self.clamp_squared = if is_hooked {
+            R::splat(FARTHEST * FARTHEST)
+        } else {
+            self.edge_limit_squared
+        };
+    }
+
+    fn hold_back(&mut self) {
+        vectorized(HoldBack(self));
+    }
+
+    fn write_solution(&self, lane: usize, positions: &mut [Point3<f32>]) {
+        let center = self.origin.lane(lane);
+        for (x, p) in self.solution.iter().zip(positions) {
+            let x = x.lane(lane);
+            *p = Point3::from([0, 1, 2].map(|axis| (x[axis] + center[axis]) as f32));
+        }
+    }
+
+    fn shift(&mut self, lane: usize, node: usize, by: [f64; 3]) {
+        let x = self.solution[node].lane(lane);
+        self.solution[node].set_lane(lane, [0, 1, 2].map(|axis| x[axis] + by[axis]));
+    }
+
+    fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool) {
+        let amplitude = (0.5 * self.mass.lane(lane) * squared).sqrt() / self.h_e.lane(lane);
+        self.drive.set_lane(lane, self.drive.lane(lane) + amplitude);
+        if stopped {
+            self.lane_states[lane].has_history = false;
+        }
+    }
+
+    fn effective_step(&self, lane: usize) -> [f64; 2] {
+        let mass = self.inv_masses.first().map_or(1.0, |w| 1.0 / w.lane(lane));
+        [self.h_e.lane(lane), mass / self.mass.lane(lane)]
+    }
+
+    fn place(&mut self, lane: usize, node: usize, offset: [f64; 3]) {
+        self.displacements[node].set_lane(lane, offset);
+        self.previous_displacements[node].set_lane(lane, offset);
+    }
+
     fn finish(&mut self) {
         vectorized(Finish(self));
     }
@@ -223,6 +266,7 @@ vectorized_work!(
     Descend<(&'a Substep, u32)> -> (),
     |group, how| group.descend_lanes(how.0, how.1)
 );
+vectorized_work!(HoldBack<> -> (), |group, | group.hold_back_lanes());
 vectorized_work!(Finish<> -> (), |group, | group.finish_lanes());
 vectorized_work!(Turn<&'a Substep> -> (), |group, substep| group.turn_lanes(substep));
 vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());

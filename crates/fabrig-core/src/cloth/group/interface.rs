@@ -78,6 +78,21 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>);
     /// The constraints of a substep. Reads the ports of all groups.
     fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]);
+    /// Whether a hook has the last word on positions from now on.
+    fn set_hooked(&mut self, is_hooked: bool);
+    /// After the constraints: holds steps back as the end of the substep would without a hook.
+    fn hold_back(&mut self);
+    /// Where the constraints put the nodes of a patch. [mm, head frame]
+    fn write_solution(&self, lane: usize, positions: &mut [Point3<f32>]);
+    /// Moves a node between constraints and new state. (mm)
+    fn shift(&mut self, lane: usize, node: usize, by: [f64; 3]);
+    /// Lets the monitor know that nodes of a patch were moved from outside by `squared`
+    /// altogether (mm^2), and forgets its history where that `stopped` it.
+    fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool);
+    /// Effective step (s) and effective mass against the material's, of a patch.
+    fn effective_step(&self, lane: usize) -> [f64; 2];
+    /// Puts a node at rest against its moving target at an offset. (mm)
+    fn place(&mut self, lane: usize, node: usize, offset: [f64; 3]);
     /// After the constraints of a substep: the new state.
     fn finish(&mut self);
     /// [`PatchGroup::finish`], and then [`PatchGroup::predict`] for the substep that follows in

@@ -66,6 +66,8 @@ pub(crate) struct Group<R> {
     pub(super) pressure: R,
     pub(super) inv_edge_squared: R,
     /// Half the mean edge, squared. [mm^2]
+    pub(super) edge_limit_squared: R,
+    /// That, or more than any step while a hook has the last word. [mm^2]
     pub(super) clamp_squared: R,
     pub(super) air: Air<R>,
     pub(super) inv_air_mass: R,
@@ -203,6 +205,13 @@ impl<R: Real> Group<R> {
                 })
                 .collect()
         };
+        // A grid without edges has no measure to hold displacements to.
+        let edge_limit_squared = R::select_less(
+            R::splat(0.0),
+            mean_edge,
+            mean_edge * mean_edge * R::splat(0.25),
+            R::splat(FARTHEST * FARTHEST),
+        );
         Self {
             patches: patches.to_vec(),
             integrator: options.integrator,
@@ -226,13 +235,8 @@ impl<R: Real> Group<R> {
             bend_dropoff: per_lane(&|p| p.material.bend_angle_dropoff),
             pressure: per_lane(&|p| p.material.pressure_stiffness(n, area(p))),
             inv_edge_squared: R::splat(1.0) / (mean_edge * mean_edge).max(R::splat(1e-12)),
-            // A grid without edges has no measure to hold displacements to.
-            clamp_squared: R::select_less(
-                R::splat(0.0),
-                mean_edge,
-                mean_edge * mean_edge * R::splat(0.25),
-                R::splat(FARTHEST * FARTHEST),
-            ),
+            clamp_squared: edge_limit_squared,
+            edge_limit_squared,
             air: Air {
                 density: R::splat(options.air_density),
                 drag: R::splat(options.drag),

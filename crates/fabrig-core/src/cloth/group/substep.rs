@@ -192,6 +192,35 @@ impl<R: Real> Group<R> {
         }
     }
 
+    /// Holds displacements in the solution itself, for a hook to see: as [`Self::finish_node`]
+    /// does, which then no longer has to.
+    #[inline(always)]
+    pub(super) fn hold_back_lanes(&mut self) {
+        let [before, after] = self.weights;
+        let weights = [0, 1, 2].map(|k| R::splat(after[k] - before[k]));
+        let limit = self.edge_limit_squared;
+        for i in 0..self.solution.len() {
+            let old = self.displacements[i];
+            let step = self.solution[i] - self.targets[i] - old;
+            let moved = step + self.weighted(i, weights);
+            let (relative, absolute) = (step.dot(step), moved.dot(moved));
+            let squared = R::select_less(relative, absolute, relative, absolute);
+            if !R::any_less(limit, squared) {
+                continue;
+            }
+            let (one, zero) = (R::splat(1.0), R::splat(0.0));
+            self.clamped += R::select_less(limit, squared, one, zero);
+            let held = self.targets[i] + (old + step * (limit / squared.max(limit)).sqrt());
+            let x = self.solution[i];
+            let select = |a: R, b: R| R::select_less(limit, squared, a, b);
+            self.solution[i] = Vec3::new(
+                select(held.x, x.x),
+                select(held.y, x.y),
+                select(held.z, x.z),
+            );
+        }
+    }
+
     #[inline(always)]
     fn predict_all<const IS_TURN: bool>(&mut self, substep: &Substep, p: &Prediction<R>) {
         let [w, dw] = substep.angular;

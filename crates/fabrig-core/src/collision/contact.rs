@@ -1,0 +1,376 @@
+//! Contact of a cloth with itself and with the world, as a hook of its substeps.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::detect::PairList;
+use super::mesh::Part;
+use super::project::{Active, SmoothContact};
+use super::rules::Rules;
+use super::sticky::Bond;
+use super::world::WorldCollider;
+use super::{Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask};
+use crate::anatomy::GridShape;
+use crate::cloth::{HookSubstep, SubstepHook};
+
+/// Furthest that a node or a collider goes in one pass. (mm)
+pub(super) const PASS_LENGTH: f64 = 1.0;
+/// A collider that goes further in a frame did not move there: it was put there. (mm)
+const CUT: f64 = 500.0;
+/// Most passes of a substep; faster things are cut short, and counted as held.
+const MOST_PASSES: usize = 256;
+
+/// A patch as contact sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactPatch {
+    /// Its grid.
+    pub shape: GridShape,
+    /// Nodes at rest. [mm, head frame]
+    pub rest: Vec<Point3<f32>>,
+    /// How much tissue covers each node: how near a collider may come. (mm)
+    pub cover: Vec<f32>,
+    /// Patches that it is attached to.
+    pub attached_to: Vec<usize>,
+    /// Whether it is a ring around an opening.
+    pub is_ring: bool,
+    /// Whether its margin is that of the lips, which may stick.
+    pub is_mouth: bool,
+    /// Mass of a node. (g)
+    pub node_mass: f64,
+    /// Smooth built-in bodies ([`ContactBody`]) that hold it out, by index.
+    pub bodies: Vec<usize>,
+}
+
+/// A rigid body of the face itself that holds patches out: an eyeball, teeth and gums.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactBody {
+    /// The body as a collider in the head frame.
+    pub collider: Collider,
+}
+
+/// Contact of one cloth.
+///
+/// # Limitations
+///
+/// - Contact is rigid: no restitution, no rolling friction.
+/// - Round colliders hold nodes, not the triangles between them: one that is smaller than a
+///   cell of the grid can slip between nodes. Give such a thing as a hull.
+/// - Between two colliders that meet, something must give: pairs caught there are counted as
+///   pinched.
+#[derive(Debug)]
+pub struct Contact {
+    pub(super) options: ContactOptions,
+    /// Patch of the cloth of each part that is one.
+    pub(super) patches: Vec<usize>,
+    pub(super) parts: Vec<Part>,
+    pub(super) rules: Rules,
+    pub(super) cloth_count: usize,
+    pub(super) rest: Vec<Point3<f32>>,
+    pub(super) cover: Vec<f32>,
+    pub(super) node_mass: Vec<f64>,
+    /// Rows of the mouth's ring that may stick: part and first node past them.
+    pub(super) sticky: Option<(usize, u32)>,
+    pub(super) positions: Vec<Point3<f32>>,
+    pub(super) wanted: Vec<Point3<f32>>,
+    pub(super) reference: Vec<Point3<f32>>,
+    /// Furthest from the reference that positions or wanted positions are. (mm)
+    pub(super) travel: Vec<f32>,
+    pub(super) part_of: Vec<u32>,
+    /// How far nodes of a part may go before it is looked at anew. (mm)
+    pub(super) budgets: Vec<f32>,
+    pub(super) lists: Vec<PairList>,
+    /// Bodies of the face, then colliders.
+    pub(super) world: Vec<WorldCollider>,
+    pub(super) body_count: usize,
+    pub(super) actives: Vec<Active>,
+    pub(super) smooth: Vec<SmoothContact>,
+    pub(super) bonds: Vec<Bond>,
+    pub(super) was_touched: Vec<bool>,
+    pub(super) is_touched: Vec<bool>,
+    pub(super) carried_by: Vec<u32>,
+    pub(super) moved: Vec<u32>,
+    pub(super) stopped: Vec<bool>,
+    pub(super) points: Vec<ContactPoint>,
+    pub(super) report: ContactReport,
+}
+
+impl Contact {
+    /// Contact among `patches` (those of a cloth, all of them) and with bodies and colliders.
+    ///
+    /// # Errors
+    ///
+    /// [`CollisionError`] for options out of range and colliders that cannot be.
+    pub fn new(
+        patches: &[ContactPatch],
+        bodies: &[ContactBody],
+        colliders: &[Collider],
+        options: &ContactOptions,
+    ) -> Result<Self, CollisionError> {
+        options.check()?;
+        let all = options.pairs == PairMask::All || !colliders.is_empty();
+        let seen: Vec<usize> = (0..patches.len())
+            .filter(|&p| all || (patches[p].is_ring && options.pairs != PairMask::None))
+            .collect();
+        let mut index_of = vec![None; patches.len()];
+        let mut parts = Vec::new();
+        let (mut rest, mut cover, mut node_mass) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sticky = None;
+        for (index, &p) in seen.iter().enumerate() {
+            let patch = &patches[p];
+            index_of[p] = Some(index);
+            let first = rest.len() as u32;
+            if let (true, Some(s)) = (patch.is_mouth, &options.sticky_lips) {
+                let rows = s.rows.min(patch.shape.v_count);
+                sticky = Some((index, first + rows * patch.shape.u_count));
+            }
+            parts.push(Part::of_grid(patch.shape, first));
+            rest.extend_from_slice(&patch.rest);
+            cover.extend_from_slice(&patch.cover);
+            node_mass.extend(std::iter::repeat_n(patch.node_mass, patch.rest.len()));
+        }
+        let of_parts: Vec<&ContactPatch> = seen.iter().map(|&p| &patches[p]).collect();
+        let rules = Rules::new(options.pairs, &of_parts, &parts, &rest, &index_of);
+        let cloth_count = rest.len();
+        let mut lists: Vec<PairList> = rules
+            .parts
+            .iter()
+            .map(|&[a, b]| PairList::new(a, b, options.friction, None))
+            .collect();
+        let mut world = Vec::new();
+        let own = if options.bones { bodies } else { &[] };
+        for (index, body) in own.iter().enumerate() {
+            let holds = |part: usize| patches[seen[part]].bodies.contains(&index);
+            let held: Vec<usize> = (0..parts.len()).filter(|&p| holds(p)).collect();
+            let mut c = WorldCollider::new(&body.collider, index, held)?;
+            c.keep_rest_gaps(&parts, &rest, options.thickness);
+            world.push(c);
+        }
+        let body_count = world.len();
+        for (index, collider) in colliders.iter().enumerate() {
+            let held = (0..parts.len()).collect();
+            world.push(WorldCollider::new(collider, index, held)?);
+        }
+        let cloth_parts = parts.len();
+        for (index, collider) in world.iter_mut().enumerate() {
+            if collider.shape.is_smooth() {
+                continue;
+            }
+            let (vertices, triangles) = &collider.shape.mesh;
+            let first = rest.len() as u32;
+            collider.part = Some(parts.len());
+            for &held in &collider.held {
+                lists.push(PairList::new(
+                    held,
+                    parts.len(),
+                    collider.friction,
+                    Some(index),
+                ));
+            }
+            parts.push(Part::of_mesh(vertices, triangles, first));
+            rest.extend(vertices.iter().map(|p| p.cast::<f32>()));
+            cover.extend(std::iter::repeat_n(0.0, vertices.len()));
+        }
+        let count = rest.len();
+        let mut part_of = vec![0; count];
+        for (index, part) in parts.iter().enumerate() {
+            part_of[part.first as usize..(part.first + part.count) as usize].fill(index as u32);
+        }
+        let forces = vec![crate::Vector::zeros(); colliders.len()];
+        Ok(Self {
+            options: *options,
+            patches: seen,
+            rules,
+            cloth_count,
+            positions: rest.clone(),
+            wanted: rest.clone(),
+            reference: rest.clone(),
+            travel: vec![f32::INFINITY; count],
+            part_of,
+            budgets: vec![-1.0; parts.len()],
+            stopped: vec![false; cloth_parts],
+            parts,
+            rest,
+            cover,
+            node_mass,
+            sticky,
+            lists,
+            world,
+            body_count,
+            actives: Vec::new(),
+            smooth: Vec::new(),
+            bonds: Vec::new(),
+            was_touched: vec![false; cloth_count],
+            is_touched: vec![false; cloth_count],
+            carried_by: vec![u32::MAX; cloth_count],
+            moved: Vec::new(),
+            points: Vec::new(),
+            report: ContactReport {
+                forces,
+                ..ContactReport::default()
+            },
+        })
+    }
+
+    /// Whether there is anything that could touch.
+    pub fn is_idle(&self) -> bool {
+        self.lists.is_empty() && self.world.is_empty()
+    }
+
+    /// Says where bodies and colliders will be at the end of the next frame.
+    ///
+    /// - `bodies`, `colliders`: poses in the head frame, one each (mm)
+    pub fn begin_frame(&mut self, bodies: &[Isometry3<f64>], colliders: &[Isometry3<f64>]) {
+        let poses = bodies.iter().take(self.body_count).chain(colliders);
+        let mut cut = Vec::new();
+        for (index, (collider, pose)) in self.world.iter_mut().zip(poses).enumerate() {
+            collider.start = collider.pose;
+            collider.end = *pose;
+            if index >= self.body_count && collider.way([0.0, 1.0]) > CUT {
+                cut.push(index);
+            }
+        }
+        let started = (self.report.started_inside, self.report.started_depth);
+        self.report = ContactReport {
+            forces: std::mem::take(&mut self.report.forces),
+            started_inside: started.0,
+            started_depth: started.1,
+            ..ContactReport::default()
+        };
+        if !cut.is_empty() {
+            let goal = self.positions[..self.cloth_count].to_vec();
+            self.bring_in_colliders(&cut, &goal);
+        }
+    }
+
+    /// What was done in the last frame.
+    pub fn report(&self) -> &ContactReport {
+        &self.report
+    }
+
+    /// Where things touched at the end of the last frame.
+    pub fn points(&self) -> &[ContactPoint] {
+        &self.points
+    }
+
+    /// Moves everything from where it is to where it is wanted, in passes short enough that
+    /// nothing is overlooked.
+    fn walk(&mut self, goal: &[Point3<f32>], progress: [f64; 2], force_per_shift: f64) {
+        let furthest = self.longest_way(goal, progress);
+        let passes = ((furthest / PASS_LENGTH).ceil() as usize).clamp(1, MOST_PASSES);
+        self.points.clear();
+        for f in &mut self.report.forces {
+            *f = crate::Vector::zeros();
+        }
+        self.is_touched.fill(false);
+        for pass in 0..passes {
+            let left = (passes - pass) as f64;
+            let share = 1.0 / left;
+            if passes == 1 {
+                self.wanted[..self.cloth_count].copy_from_slice(goal);
+            } else {
+                for ((w, x), g) in self.wanted.iter_mut().zip(&self.positions).zip(goal) {
+                    let way = g - x;
+                    let length = f64::from(way.norm()) * share;
+                    // Nodes that were held up come after, but no faster than the pass allows.
+                    let s = share * (PASS_LENGTH / length.max(PASS_LENGTH));
+                    *w = x + way * s as f32;
+                }
+            }
+            let s = progress[0] + (progress[1] - progress[0]) * (pass + 1) as f64 / passes as f64;
+            self.place_colliders(s);
+            for bond in &mut self.bonds {
+                bond.pull = 0.0;
+            }
+            self.pass(force_per_shift, passes);
+        }
+    }
+
+    fn longest_way(&self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
+        let mut squared = 0.0_f32;
+        for (g, x) in goal.iter().zip(&self.positions) {
+            squared = squared.max((g - x).norm_squared());
+        }
+        let mut furthest = f64::from(squared).sqrt();
+        for c in &self.world {
+            if c.shape.radius.is_finite() && !self.may_meet(c, progress) {
+                continue;
+            }
+            furthest = furthest.max(c.way(progress));
+        }
+        furthest
+    }
+
+    /// One substep of contact; leaves where everything is in `positions`.
+    pub(super) fn resolve(
+        &mut self,
+        goal: &[Point3<f32>],
+        progress: [f64; 2],
+        force_per_shift: f64,
+    ) {
+        std::mem::swap(&mut self.was_touched, &mut self.is_touched);
+        self.walk(goal, progress, force_per_shift);
+        self.moved.clear();
+        for (i, (x, g)) in self.positions.iter().zip(goal).enumerate() {
+            if x != g {
+                self.moved.push(i as u32);
+            }
+        }
+        self.report.contacts = self.points.len();
+        self.report.candidates = self.lists.iter().map(|l| l.candidates.len()).sum();
+    }
+}
+
+impl SubstepHook for Contact {
+    fn patches(&self) -> &[usize] {
+        &self.patches
+    }
+
+    fn reset(&mut self, wanted: &mut [Point3<f32>]) {
+        let count = self.cloth_count;
+        self.positions[..count].copy_from_slice(&self.rest[..count]);
+        self.budgets.fill(-1.0);
+        self.bonds.clear();
+        let goal = wanted.to_vec();
+        // First without the world, from rest, where nothing crosses; then the world comes in
+        // from outside.
+        let mut aside = std::mem::take(&mut self.world);
+        let colliders = aside.split_off(self.body_count);
+        self.world = aside;
+        let lists = std::mem::take(&mut self.lists);
+        let (own, outer): (Vec<_>, Vec<_>) = lists.into_iter().partition(|l| l.collider.is_none());
+        self.lists = own;
+        for body in &mut self.world {
+            body.start = body.end;
+            body.pose = body.end;
+        }
+        self.resolve(&goal, [0.0, 1.0], 0.0);
+        self.lists.extend(outer);
+        self.world.extend(colliders);
+        self.budgets.fill(-1.0);
+        let all: Vec<usize> = (self.body_count..self.world.len()).collect();
+        self.bring_in_colliders(&all, &goal);
+        self.resolve(&goal, [1.0, 1.0], 0.0);
+        self.report.held = 0;
+        wanted.copy_from_slice(&self.positions[..count]);
+        self.stopped.fill(true);
+    }
+
+    fn correct(&mut self, substep: &HookSubstep, nodes: &mut [Point3<f32>]) {
+        // A shift of a node of mass 1 g by 1 mm takes this force. (N)
+        let force_per_shift = substep.effective_mass / (substep.h_e * substep.h_e) * 1e-6;
+        self.stopped.fill(false);
+        let goal = nodes.to_vec();
+        self.resolve(&goal, substep.progress, force_per_shift);
+        nodes.copy_from_slice(&self.positions[..self.cloth_count]);
+        if substep.progress[1] >= 1.0 {
+            self.form_bonds();
+        }
+    }
+
+    fn moved(&self) -> &[u32] {
+        &self.moved
+    }
+
+    fn stopped(&self) -> &[bool] {
+        &self.stopped
+    }
+}

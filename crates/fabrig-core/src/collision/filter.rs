@@ -1,0 +1,229 @@
+//! The guarantee: no pass ends in a crossing.
+//!
+//! After contacts are projected, every pair that could have met is followed along its straight
+//! way by conservative advancement: its distance can fall by no more than its nodes move
+//! against each other. A pair that would lose nine tenths of its distance is not safe. Its
+//! nodes are then held back: half the way, and after some rounds no way at all; where they
+//! stood nothing crossed. A collider cannot be held back, so nodes in front of it are carried
+//! along with it instead, and what they meet is carried too.
+//!
+//! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
+
+use super::contact::Contact;
+use super::detect::{MARGIN, approach};
+use super::distance::{PairKind, closest_weights, weighted, wide};
+use super::project::{Active, narrow};
+use crate::Vector;
+
+/// Rounds in which ways are halved, before nodes are held.
+const HALVINGS: usize = 6;
+/// Rounds at most.
+const ROUNDS: usize = 200;
+/// Share of its distance that a pair keeps in a pass.
+const KEPT: f64 = 0.1;
+
+impl Contact {
+    /// One pass: from `positions` to `wanted`, or as far as that is safe.
+    ///
+    /// - `force_per_shift`: what a shift of a node of 1 g by 1 mm takes (N)
+    pub(super) fn pass(&mut self, force_per_shift: f64, passes: usize) {
+        self.carried_by.fill(u32::MAX);
+        self.refresh_candidates();
+        self.collect();
+        self.collect_smooth();
+        if !self.actives.is_empty() || !self.smooth.is_empty() || !self.bonds.is_empty() {
+            let pushes = self.project_within(force_per_shift);
+            self.make_safe(pushes);
+            self.note_contacts(force_per_shift / passes as f64);
+        }
+        std::mem::swap(&mut self.positions, &mut self.wanted);
+        // Colliders' nodes are wanted where they are until they are placed anew.
+        let count = self.cloth_count;
+        let (positions, wanted) = (&self.positions, &mut self.wanted);
+        wanted[count..].copy_from_slice(&positions[count..]);
+    }
+
+    /// Projects, and returns whether nodes went further than collecting allowed for.
+    fn project_within(&mut self, force_per_shift: f64) -> bool {
+        let touched: Vec<(u32, Vector)> = self
+            .actives
+            .iter()
+            .flat_map(|a| a.nodes)
+            .chain(self.smooth.iter().map(|s| s.node))
+            .chain(self.bonds.iter().flat_map(|b| b.nodes))
+            .filter(|&n| (n as usize) < self.cloth_count)
+            .map(|n| (n, wide(&self.wanted[n as usize])))
+            .collect();
+        self.project(force_per_shift);
+        touched
+            .iter()
+            .any(|(n, before)| (wide(&self.wanted[*n as usize]) - before).norm() > MARGIN)
+    }
+
+    fn make_safe(&mut self, mut went_far: bool) {
+        let mut halved = 0;
+        for round in 0..ROUNDS {
+            if went_far {
+                // What was pushed may now meet what was not looked at.
+                let pushes: Vec<Active> = self
+                    .actives
+                    .iter()
+                    .filter(|a| a.push > 0.0)
+                    .copied()
+                    .collect();
+                self.refresh_candidates();
+                self.collect();
+                self.remember(&pushes);
+                went_far = false;
+            }
+            let mut is_safe = true;
+            let actives = std::mem::take(&mut self.actives);
+            for a in &actives {
+                if self.is_safe(a) {
+                    continue;
+                }
+                is_safe = false;
+                if let Some(c) = self.carrier(a) {
+                    if self.carry(a, c) {
+                        went_far = true;
+                        continue;
+                    }
+                    if self.lists[a.list as usize].collider.is_some() {
+                        if round + 1 == ROUNDS {
+                            self.report.pinched += 1;
+                        }
+                        continue;
+                    }
+                }
+                self.report.held += 1;
+                for n in a.nodes {
+                    let i = n as usize;
+                    if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
+                        continue;
+                    }
+                    let from = wide(&self.positions[i]);
+                    let way = wide(&self.wanted[i]) - from;
+                    self.wanted[i] = if halved < HALVINGS {
+                        narrow(&(from + way * 0.5))
+                    } else {
+                        self.positions[i]
+                    };
+                }
+            }
+            self.actives = actives;
+            halved += 1;
+            if self.carry_out_of_round() {
+                is_safe = false;
+                went_far = true;
+            }
+            if is_safe {
+                return;
+            }
+        }
+    }
+
+    /// Keeps what pushed before candidates were collected anew, for the report.
+    fn remember(&mut self, pushes: &[Active]) {
+        for p in pushes {
+            match self
+                .actives
+                .iter_mut()
+                .find(|a| a.nodes == p.nodes && a.kind == p.kind)
+            {
+                Some(a) => a.push = p.push,
+                None => self.actives.push(*p),
+            }
+        }
+    }
+
+    /// The collider of a pair, or the one that carries one of its nodes.
+    fn carrier(&self, a: &Active) -> Option<usize> {
+        if let Some(c) = self.lists[a.list as usize].collider {
+            return Some(c);
+        }
+        a.nodes
+            .iter()
+            .map(|&n| self.carried_by[n as usize])
+            .filter(|&c| c != u32::MAX)
+            .min()
+            .map(|c| c as usize)
+    }
+
+    /// Carries the nodes of a pair along with a collider. Returns whether any was not yet.
+    fn carry(&mut self, a: &Active, collider: usize) -> bool {
+        let mut any = false;
+        for n in a.nodes {
+            if (n as usize) < self.cloth_count && self.carried_by[n as usize] == u32::MAX {
+                self.carry_node(n as usize, collider);
+                any = true;
+            }
+        }
+        any
+    }
+
+    fn carry_node(&mut self, node: usize, collider: usize) {
+        let c = &self.world[collider];
+        let local = c.pose_before.inverse() * crate::Point::from(wide(&self.positions[node]));
+        self.wanted[node] = narrow(&(c.pose * local).coords);
+        self.carried_by[node] = collider as u32;
+        self.report.carried += 1;
+    }
+
+    /// Carries nodes that would end inside a round collider.
+    fn carry_out_of_round(&mut self) -> bool {
+        let mut any = false;
+        let smooth = std::mem::take(&mut self.smooth);
+        for s in &smooth {
+            let i = s.node as usize;
+            let c = &self.world[s.collider as usize];
+            if self.carried_by[i] != u32::MAX || !c.gaps.is_empty() {
+                continue;
+            }
+            let place = |pose: &nalgebra::Isometry3<f64>, x| {
+                let local = pose.inverse() * crate::Point::from(x);
+                c.shape.nearest(&local.coords).distance
+            };
+            let now = place(&c.pose, wide(&self.wanted[i]));
+            if now < 0.0 && now < place(&c.pose_before, wide(&self.positions[i])) {
+                self.carry_node(i, s.collider as usize);
+                any = true;
+            }
+        }
+        self.smooth = smooth;
+        any
+    }
+
+    fn is_safe(&self, a: &Active) -> bool {
+        let at = a.nodes.map(|n| wide(&self.positions[n as usize]));
+        let to = a.nodes.map(|n| wide(&self.wanted[n as usize]));
+        stays_apart(a.kind, &at, &to, a.distance)
+    }
+}
+
+/// Whether a pair `distance` apart keeps a share of that on the way from `at` to `to`.
+fn stays_apart(kind: PairKind, at: &[Vector; 4], to: &[Vector; 4], distance: f64) -> bool {
+    let nearer = approach(kind, at, to);
+    let floor = KEPT * distance;
+    if nearer <= distance - floor {
+        return true;
+    }
+    let mut t = 0.0;
+    let mut d = distance;
+    for _ in 0..64 {
+        let step = 0.9 * (d - floor) / nearer;
+        // Steps that shrink to nothing mean that the floor is reached.
+        if step < 1e-4 {
+            return false;
+        }
+        t += step;
+        if t >= 1.0 {
+            return true;
+        }
+        let now: [Vector; 4] = std::array::from_fn(|k| at[k] + (to[k] - at[k]) * t);
+        d = weighted(&closest_weights(kind, &now), &now).norm();
+        if d <= floor {
+            return false;
+        }
+    }
+    false
+}

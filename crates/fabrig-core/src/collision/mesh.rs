@@ -1,0 +1,134 @@
+//! What collides with what: patches and meshes of colliders as nodes, edges and triangles.
+
+use std::collections::BTreeSet;
+
+use super::tree::Tree;
+use crate::anatomy::GridShape;
+
+/// A cell of a part and the elements that it owns; every element is owned by one cell.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Cell {
+    /// Nodes that bound everything it owns.
+    pub(crate) hull: Vec<u32>,
+    pub(crate) nodes: Vec<u32>,
+    pub(crate) edges: Vec<[u32; 2]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+/// A patch, or the mesh of a collider.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    /// First of its nodes among all.
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    /// Its grid; none for a collider.
+    pub(crate) grid: Option<GridShape>,
+    pub(crate) cells: Vec<Cell>,
+    pub(crate) tree: Tree,
+}
+
+impl Part {
+    /// The grid of a patch; quads are cut along their first diagonal.
+    pub(crate) fn of_grid(shape: GridShape, first: u32) -> Self {
+        let (nu, nv) = (shape.u_count, shape.v_count);
+        let columns = if shape.is_periodic {
+            nu
+        } else {
+            nu.saturating_sub(1)
+        };
+        let rows = nv.saturating_sub(1);
+        let mut cells = Vec::with_capacity((columns * rows) as usize);
+        for v in 0..rows {
+            for u in 0..columns {
+                let at = |du: u32, dv: u32| first + (v + dv) * nu + (u + du) % nu;
+                let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
+                let mut cell = Cell {
+                    hull: vec![a, b, c, d],
+                    nodes: vec![a],
+                    edges: vec![[a, b], [a, d], [a, c]],
+                    triangles: vec![[a, b, c], [a, c, d]],
+                };
+                let is_last_column = !shape.is_periodic && u + 1 == columns;
+                let is_last_row = v + 1 == rows;
+                if is_last_column {
+                    cell.nodes.push(b);
+                    cell.edges.push([b, c]);
+                }
+                if is_last_row {
+                    cell.nodes.push(d);
+                    cell.edges.push([d, c]);
+                }
+                if is_last_column && is_last_row {
+                    cell.nodes.push(c);
+                }
+                cells.push(cell);
+            }
+        }
+        Self {
+            first,
+            count: shape.node_count() as u32,
+            grid: Some(shape),
+            tree: Tree::of_grid(columns as usize, rows as usize),
+            cells,
+        }
+    }
+
+    /// The mesh of a collider: `triangles` index its own vertices.
+    pub(crate) fn of_mesh(vertices: &[crate::Point], triangles: &[[u32; 3]], first: u32) -> Self {
+        let mut seen_nodes = BTreeSet::new();
+        let mut seen_edges = BTreeSet::new();
+        let mut cells = Vec::with_capacity(triangles.len());
+        let mut centers = Vec::with_capacity(triangles.len());
+        for t in triangles {
+            let [a, b, c] = t.map(|v| v + first);
+            let mut cell = Cell {
+                hull: vec![a, b, c],
+                triangles: vec![[a, b, c]],
+                ..Cell::default()
+            };
+            for v in [a, b, c] {
+                if seen_nodes.insert(v) {
+                    cell.nodes.push(v);
+                }
+            }
+            for [v, w] in [[a, b], [b, c], [c, a]] {
+                let edge = [v.min(w), v.max(w)];
+                if seen_edges.insert(edge) {
+                    cell.edges.push(edge);
+                }
+            }
+            cells.push(cell);
+            let sum: crate::Vector = t.iter().map(|&v| vertices[v as usize].coords).sum();
+            centers.push(sum / 3.0);
+        }
+        Self {
+            first,
+            count: vertices.len() as u32,
+            grid: None,
+            tree: Tree::of_centers(&centers),
+            cells,
+        }
+    }
+
+    /// Whether two nodes of this part are so near in the grid (within one cell of each other)
+    /// that its constraints keep them apart, not contact.
+    #[inline]
+    pub(crate) fn are_neighbours(&self, a: u32, b: u32) -> bool {
+        let Some(shape) = self.grid else {
+            return true;
+        };
+        let (a, b) = (a - self.first, b - self.first);
+        let (ua, va) = (a % shape.u_count, a / shape.u_count);
+        let (ub, vb) = (b % shape.u_count, b / shape.u_count);
+        let mut du = ua.abs_diff(ub);
+        if shape.is_periodic {
+            du = du.min(shape.u_count - du);
+        }
+        du <= 1 && va.abs_diff(vb) <= 1
+    }
+
+    /// All triangles, cell after cell.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
+        self.cells.iter().flat_map(|c| c.triangles.iter().copied())
+    }
+}

@@ -1,0 +1,54 @@
+//! Contact: cloth against itself and against the world.
+//!
+//! [`Contact`] is a hook of the cloth's substeps. After the constraints of a substep it takes
+//! the nodes that may touch from where they were to where the constraints want them, and sees
+//! that nothing passes through anything on the way:
+//!
+//! ```text
+//! broad phase -> candidates -> contacts that may close -> push apart, friction, bonds
+//!             -> hold back what would still cross -> new positions
+//! ```
+//!
+//! - `rules`: which elements may collide at all
+//! - `tree`, `detect`: the hierarchy of boxes that a grid implies, and candidates that stay
+//!   valid while nodes keep within their budgets
+//! - `distance`: vertices and triangles, edges and edges
+//! - `project`: contacts as planes, Coulomb friction; `sticky`: bonds between lips
+//! - `filter`: conservative advancement, the guarantee that nothing crosses
+//! - `collider`, `world`, `cloth_shape`: things of the world; the last one speaks parry
+//! - [`crossings`]: an exact test that shares nothing with the rest, to judge it by
+//!
+//! Everything runs in one fixed order on one thread: results do not depend on how many threads
+//! the cloth has.
+//!
+//! # Units
+//!
+//! Millimetres in the head frame. Forces are in newtons of a face whose patches weigh what
+//! [`crate::cloth::ClothOptions::areal_density`] says.
+
+mod cloth_shape;
+mod collider;
+mod contact;
+mod crossing;
+mod detect;
+mod distance;
+mod error;
+mod filter;
+mod judge;
+mod mesh;
+mod options;
+mod project;
+mod report;
+mod rules;
+mod sticky;
+mod tree;
+mod world;
+
+pub use collider::{Collider, ColliderFrame, ColliderKey, ColliderShape};
+pub use contact::{Contact, ContactBody, ContactPatch};
+pub use crossing::{Crossing, crossings, edges_of};
+pub use error::CollisionError;
+pub use judge::Verdict;
+pub use options::{ContactOptions, PairMask, Stickiness};
+pub use report::{ContactPoint, ContactReport};
+pub use world::collider_mesh;

@@ -1,0 +1,110 @@
+//! What collides, and how.
+
+use serde::{Deserialize, Serialize};
+
+use super::CollisionError;
+
+/// Which patches collide with each other and with themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PairMask {
+    /// None.
+    #[default]
+    None,
+    /// The ring muscles with themselves: lips with lips, lids with lids and eyeballs.
+    Sphincter,
+    /// All patches, except pairs that are attached to each other or cross at rest: these are
+    /// one tissue.
+    All,
+}
+
+/// Lips that stick: bonds between them, until a pull or a gap breaks them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Stickiness {
+    /// Bonds form between lips nearer than this beyond their resting gap. (mm)
+    pub gap: f64,
+    /// Bonds break when they are longer than this beyond their resting gap. (mm)
+    pub break_gap: f64,
+    /// Bonds break when they pull harder than this. (N)
+    pub strength: f64,
+    /// Rows of the ring, from the margin outwards, that can stick.
+    pub rows: u32,
+}
+
+impl Default for Stickiness {
+    fn default() -> Self {
+        Self {
+            gap: 0.3,
+            break_gap: 2.5,
+            strength: 0.02,
+            rows: 3,
+        }
+    }
+}
+
+/// How contact is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContactOptions {
+    /// Which patches collide.
+    pub pairs: PairMask,
+    /// Distance that colliding patches keep, or what they have at rest where that is less.
+    /// (mm)
+    pub thickness: f64,
+    /// Coulomb's friction coefficient between patches; wet inner lips and lids slide easily.
+    pub friction: f64,
+    /// Friction coefficient of lids on eyeballs.
+    pub eye_friction: f64,
+    /// Whether eyeballs, teeth and gums hold patches out.
+    pub bones: bool,
+    /// Whether lips stick, and how; none: they do not.
+    pub sticky_lips: Option<Stickiness>,
+}
+
+impl Default for ContactOptions {
+    fn default() -> Self {
+        Self {
+            pairs: PairMask::None,
+            thickness: 0.3,
+            friction: 0.2,
+            eye_friction: 0.05,
+            bones: true,
+            sticky_lips: None,
+        }
+    }
+}
+
+impl ContactOptions {
+    /// Checks ranges.
+    ///
+    /// # Errors
+    ///
+    /// [`CollisionError::Option`].
+    pub fn check(&self) -> Result<(), CollisionError> {
+        let mut ranges = vec![
+            ("thickness", self.thickness, 1e-3, 2.0),
+            ("friction", self.friction, 0.0, 10.0),
+            ("eye_friction", self.eye_friction, 0.0, 10.0),
+        ];
+        if let Some(s) = &self.sticky_lips {
+            ranges.extend([
+                ("sticky_lips.gap", s.gap, 0.0, 5.0),
+                ("sticky_lips.break_gap", s.break_gap, s.gap, 20.0),
+                ("sticky_lips.strength", s.strength, 0.0, 1e3),
+            ]);
+        }
+        for (name, value, low, high) in ranges {
+            // Written so that NaN is out of range.
+            if !(value >= low && value <= high) {
+                return Err(CollisionError::Option {
+                    name,
+                    value,
+                    low,
+                    high,
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,206 @@
+//! Bodies and colliders on their way, and how they come in.
+
+use nalgebra::{Isometry3, Point3, Translation3};
+
+use super::cloth_shape::WorldShape;
+use super::collider::between;
+use super::contact::{Contact, PASS_LENGTH};
+use super::mesh::Part;
+use super::{Collider, CollisionError};
+use crate::{Point, Vector};
+
+/// A collider and where it is.
+#[derive(Debug)]
+pub(super) struct WorldCollider {
+    pub(super) shape: WorldShape,
+    pub(super) friction: f64,
+    /// Parts that it holds out.
+    pub(super) held: Vec<usize>,
+    /// Its own part, if it has a mesh.
+    pub(super) part: Option<usize>,
+    /// For each node of the held parts, one after the other, the distance it must keep (mm);
+    /// empty: what covers the node.
+    pub(super) gaps: Vec<f32>,
+    /// Pose that the cloth has seen, and before the pass. [mm, head frame]
+    pub(super) pose: Isometry3<f64>,
+    pub(super) pose_before: Isometry3<f64>,
+    /// Poses at the ends of the frame.
+    pub(super) start: Isometry3<f64>,
+    pub(super) end: Isometry3<f64>,
+}
+
+impl WorldCollider {
+    pub(super) fn new(
+        collider: &Collider,
+        index: usize,
+        held: Vec<usize>,
+    ) -> Result<Self, CollisionError> {
+        collider.check(index)?;
+        let pose = collider.pose_at(f64::NEG_INFINITY);
+        Ok(Self {
+            shape: WorldShape::new(&collider.shape, index, &collider.name)?,
+            friction: collider.friction,
+            held,
+            part: None,
+            gaps: Vec::new(),
+            pose,
+            pose_before: pose,
+            start: pose,
+            end: pose,
+        })
+    }
+
+    /// Keeps nodes as far away as they are at rest, but no further than `thickness` asks. (mm)
+    pub(super) fn keep_rest_gaps(&mut self, parts: &[Part], rest: &[Point3<f32>], thickness: f64) {
+        for &part in &self.held {
+            let first = parts[part].first as usize;
+            for p in &rest[first..first + parts[part].count as usize] {
+                let local = self.pose.inverse() * p.cast::<f64>();
+                let distance = self.shape.nearest(&local.coords).distance;
+                // A little less, so that rest itself is free of contact.
+                self.gaps.push((distance - 0.02).min(thickness) as f32);
+            }
+        }
+    }
+
+    fn at(&self, s: f64) -> Isometry3<f64> {
+        if self.start == self.end {
+            return self.end;
+        }
+        between(&self.start, &self.end, s)
+    }
+
+    /// How far any of its points goes between two times of the frame, at most. (mm)
+    pub(super) fn way(&self, progress: [f64; 2]) -> f64 {
+        let (a, b) = (self.pose, self.at(progress[1]));
+        let turn = (b.rotation * a.rotation.inverse()).angle();
+        let reach = if self.shape.radius.is_finite() {
+            self.shape.radius
+        } else {
+            100.0
+        };
+        (b.translation.vector - a.translation.vector).norm() + turn * reach
+    }
+}
+
+impl Contact {
+    /// Whether a collider comes near any node between two times of the frame.
+    pub(super) fn may_meet(&self, c: &WorldCollider, progress: [f64; 2]) -> bool {
+        let Some((low, high)) = self.cloth_bounds() else {
+            return false;
+        };
+        let (a, b) = (
+            c.pose.translation.vector,
+            c.at(progress[1]).translation.vector,
+        );
+        let reach = c.shape.radius + 20.0;
+        (0..3).all(|k| {
+            a[k].min(b[k]) - reach <= f64::from(high[k])
+                && f64::from(low[k]) <= a[k].max(b[k]) + reach
+        })
+    }
+
+    /// Box of all patches as they were last looked at.
+    fn cloth_bounds(&self) -> Option<([f32; 3], [f32; 3])> {
+        let mut nodes = self.positions[..self.cloth_count].iter();
+        let first = nodes.next()?;
+        let (mut low, mut high) = (*first, *first);
+        // Every seventh node will do: the caller adds more than a few cells.
+        for p in nodes.step_by(7) {
+            low = low.inf(p);
+            high = high.sup(p);
+        }
+        Some((low.coords.into(), high.coords.into()))
+    }
+
+    /// Puts colliders where they are at a time of the frame, as wanted.
+    pub(super) fn place_colliders(&mut self, s: f64) {
+        for c in &mut self.world {
+            c.pose_before = c.pose;
+            c.pose = c.at(s);
+            let Some(part) = c.part else {
+                continue;
+            };
+            let first = self.parts[part].first as usize;
+            for (k, p) in c.shape.mesh.0.iter().enumerate() {
+                self.wanted[first + k] = (c.pose * p).cast();
+            }
+        }
+    }
+
+    /// Brings colliders from outside to where they start, pushing what is in the way, and
+    /// notes how many nodes stood inside.
+    pub(super) fn bring_in_colliders(&mut self, which: &[usize], goal: &[Point3<f32>]) {
+        self.report.started_inside = 0;
+        self.report.started_depth = 0.0;
+        let Some((low, high)) = self.cloth_bounds() else {
+            return;
+        };
+        let (low, high) = (
+            Vector::from(low.map(f64::from)),
+            Vector::from(high.map(f64::from)),
+        );
+        let center = (low + high) * 0.5;
+        let size = (high - low).norm() * 0.5;
+        for &index in which {
+            let c = &self.world[index];
+            let end = c.end;
+            let (mut inside, mut deepest) = (0, 0.0_f64);
+            for p in goal {
+                let local = end.inverse() * p.cast::<f64>();
+                let distance = c.shape.nearest(&local.coords).distance;
+                if distance < 0.0 {
+                    inside += 1;
+                    deepest = deepest.max(-distance);
+                }
+            }
+            self.report.started_inside += inside;
+            self.report.started_depth = self.report.started_depth.max(deepest);
+            let out = if c.shape.radius.is_finite() {
+                let away = end.translation.vector - center;
+                let direction = away.try_normalize(1e-9).unwrap_or_else(Vector::z);
+                let far = size + c.shape.radius + 20.0;
+                direction * (far - away.norm()).max(0.0)
+            } else {
+                end.rotation * Vector::y() * -(2.0 * size + 20.0)
+            };
+            let outside = Isometry3::from_parts(
+                Translation3::from(end.translation.vector + out),
+                end.rotation,
+            );
+            let c = &mut self.world[index];
+            (c.start, c.end, c.pose) = (outside, outside, outside);
+            if let Some(part) = c.part {
+                let first = self.parts[part].first as usize;
+                for (k, p) in c.shape.mesh.0.iter().enumerate() {
+                    self.positions[first + k] = (outside * p).cast();
+                    self.wanted[first + k] = self.positions[first + k];
+                }
+                self.budgets[part] = -1.0;
+            }
+            self.world[index].start = outside;
+            self.world[index].end = end;
+            let way = self.world[index].way([0.0, 1.0]);
+            let steps = (way / (64.0 * PASS_LENGTH)).ceil().max(1.0) as usize;
+            for step in 0..steps {
+                let progress = [step, step + 1].map(|i| i as f64 / steps as f64);
+                self.resolve(goal, progress, 0.0);
+            }
+            self.world[index].start = end;
+        }
+    }
+}
+
+/// Corners of the mesh of a collider at a pose, for showing and judging. [mm, head frame]
+///
+/// # Errors
+///
+/// [`CollisionError`] for a collider that cannot be.
+pub fn collider_mesh(
+    collider: &Collider,
+    index: usize,
+) -> Result<(Vec<Point>, Vec<[u32; 3]>), CollisionError> {
+    collider.check(index)?;
+    let shape = WorldShape::new(&collider.shape, index, &collider.name)?;
+    Ok(shape.shown_mesh(&collider.shape))
+}

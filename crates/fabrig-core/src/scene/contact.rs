@@ -1,0 +1,177 @@
+//! Contact of a face: its patches, eyeballs and the colliders around it.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::anatomy::{Attachment, PatchKind, Side};
+use crate::cloth::ClothPatch;
+use crate::collision::{
+    Collider, ColliderFrame, ColliderKey, ColliderShape, CollisionError, Contact, ContactBody,
+    ContactPatch, PairMask, Verdict,
+};
+use crate::rig::Rig;
+use crate::scene::Scene;
+use nalgebra::Point3;
+
+/// Deeper nodes than this are covered no more: the tissue over them gives way. (mm)
+const DEEPEST_COVER: f64 = 5.0;
+
+/// Contact with the poses of what takes part in it.
+pub(super) struct FaceContact {
+    pub(super) contact: Contact,
+    colliders: Vec<Collider>,
+    /// Poses that code set, in each collider's frame.
+    set_poses: Vec<Option<Isometry3<f64>>>,
+    /// Poses now, in the head frame. (mm)
+    poses: Vec<Isometry3<f64>>,
+    centers: [Isometry3<f64>; 2],
+}
+
+impl FaceContact {
+    /// Contact as a scene asks for it; none where nothing could touch.
+    pub(super) fn new(
+        rig: &Rig,
+        scene: &Scene,
+        patches: &[ClothPatch],
+    ) -> Result<Option<Self>, CollisionError> {
+        scene.contact.check()?;
+        if scene.contact.pairs == PairMask::None && scene.colliders.is_empty() {
+            return Ok(None);
+        }
+        let of_contact: Vec<ContactPatch> = rig
+            .patches
+            .iter()
+            .zip(patches)
+            .map(|(own, cloth)| {
+                let chart = &own.patch.chart;
+                let is_ring = chart.kind == PatchKind::Sphincter;
+                ContactPatch {
+                    shape: cloth.shape,
+                    rest: cloth.rest.clone(),
+                    cover: chart
+                        .nodes
+                        .iter()
+                        .map(|n| n.depth.min(DEEPEST_COVER) as f32)
+                        .collect(),
+                    attached_to: chart
+                        .attachments
+                        .iter()
+                        .filter_map(|a| match a {
+                            Attachment::Patch { patch, .. } => Some(*patch as usize),
+                            Attachment::Body { .. } => None,
+                        })
+                        .collect(),
+                    is_ring,
+                    is_mouth: is_ring && chart.side == Side::Mid,
+                    node_mass: scene.cloth.areal_density * cloth.material.mass * area(cloth)
+                        / cloth.rest.len() as f64,
+                    bodies: match (is_ring, chart.side) {
+                        (true, Side::Left) => vec![0],
+                        (true, Side::Right) => vec![1],
+                        _ => Vec::new(),
+                    },
+                }
+            })
+            .collect();
+        let bodies: Vec<ContactBody> = ["eye_l", "eye_r"]
+            .iter()
+            .zip(&rig.eyes)
+            .map(|(name, eye)| ContactBody {
+                collider: Collider {
+                    name: (*name).to_owned(),
+                    shape: ColliderShape::Ball { radius: eye.radius },
+                    frame: ColliderFrame::Head,
+                    friction: scene.contact.eye_friction,
+                    keys: vec![ColliderKey {
+                        time: 0.0,
+                        position: eye.center.coords,
+                        rotation: Vector3::zeros(),
+                    }],
+                },
+            })
+            .collect();
+        let contact = Contact::new(&of_contact, &bodies, &scene.colliders, &scene.contact)?;
+        Ok(Some(Self {
+            contact,
+            set_poses: vec![None; scene.colliders.len()],
+            poses: vec![Isometry3::identity(); scene.colliders.len()],
+            colliders: scene.colliders.clone(),
+            centers: [0, 1].map(|e| {
+                Isometry3::translation(
+                    rig.eyes[e].center.x,
+                    rig.eyes[e].center.y,
+                    rig.eyes[e].center.z,
+                )
+            }),
+        }))
+    }
+
+    /// Says where everything is at the end of the next frame.
+    ///
+    /// - `eyes`: what the eyeballs do against rest [mm, head frame]
+    pub(super) fn begin_frame(
+        &mut self,
+        time: f64,
+        head: &Isometry3<f64>,
+        eyes: [Isometry3<f64>; 2],
+    ) {
+        for ((pose, collider), set) in self
+            .poses
+            .iter_mut()
+            .zip(&self.colliders)
+            .zip(&self.set_poses)
+        {
+            let own = set.unwrap_or_else(|| collider.pose_at(time));
+            *pose = match collider.frame {
+                ColliderFrame::World => head.inverse() * own,
+                ColliderFrame::Head => own,
+            };
+        }
+        let eyes = [0, 1].map(|e| eyes[e] * self.centers[e]);
+        self.contact.begin_frame(&eyes, &self.poses);
+    }
+
+    pub(super) fn set_pose(
+        &mut self,
+        index: usize,
+        pose: Isometry3<f64>,
+    ) -> Result<(), CollisionError> {
+        let count = self.set_poses.len();
+        let slot = self
+            .set_poses
+            .get_mut(index)
+            .ok_or(CollisionError::NoSuchCollider { index, count })?;
+        if !pose.translation.vector.iter().all(|c| c.abs() < 1e6) {
+            return Err(CollisionError::Pose { index });
+        }
+        *slot = Some(pose);
+        Ok(())
+    }
+
+    /// Poses of the colliders at the end of the last frame. [mm, head frame]
+    pub(super) fn poses(&self) -> &[Isometry3<f64>] {
+        &self.poses
+    }
+
+    pub(super) fn judge<'a>(
+        &self,
+        positions: impl Fn(usize) -> &'a [Point3<f32>],
+    ) -> Result<Verdict, CollisionError> {
+        let colliders: Vec<(&Collider, Isometry3<f64>)> = self
+            .colliders
+            .iter()
+            .zip(self.poses.iter().copied())
+            .collect();
+        self.contact.judge(positions, &colliders)
+    }
+}
+
+/// Area of a patch at rest. [mm^2]
+fn area(patch: &ClothPatch) -> f64 {
+    let at = |i: u32| patch.rest[i as usize].map(f64::from);
+    patch
+        .shape
+        .quads()
+        .iter()
+        .map(|&[a, b, c, d]| (at(c) - at(a)).cross(&(at(d) - at(b))).norm() / 2.0)
+        .sum()
+}
