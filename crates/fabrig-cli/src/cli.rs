@@ -204,6 +204,15 @@ pub(crate) struct SceneArgs {
     /// Leave the cloth out: patches stand where the muscle shapes want them
     #[arg(long)]
     pub(crate) without_dynamics: bool,
+    /// Which patches collide
+    #[arg(long, value_enum, default_value_t = ContactPairs::None)]
+    pub(crate) contact: ContactPairs,
+    /// Things that the face can touch: a TOML file of [[colliders]]
+    #[arg(long, value_name = "COLLIDERS.toml")]
+    pub(crate) colliders: Option<PathBuf>,
+    /// Let lips stick to each other
+    #[arg(long)]
+    pub(crate) sticky_lips: bool,
     /// Skin meshes per second in the recording, 0 for none
     #[arg(long, default_value_t = RecordingOptions::default().skin_hz, value_parser = parse_rate)]
     pub(crate) skin_hz: f64,
@@ -219,6 +228,17 @@ pub(crate) struct SceneArgs {
     /// Print the report as JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Which patches collide.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ContactPairs {
+    /// None
+    None,
+    /// Ring muscles with themselves: lips, and lids with eyeballs
+    Sphincter,
+    /// All that are not attached to each other
+    All,
 }
 
 impl SceneArgs {

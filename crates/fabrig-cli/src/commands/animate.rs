@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use fabrig_core::edit::{Edits, edits_path};
+use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
 use fabrig_core::rig::Rig;
@@ -12,7 +13,7 @@ use fabrig_core::scene::{Dynamics, Scene};
 
 use super::viewers::{print_how_to_open, write_viewer_files};
 use super::{Outcome, check_output, stem};
-use crate::cli::{AnimateArgs, SceneArgs, TakeArgs};
+use crate::cli::{AnimateArgs, ContactPairs, SceneArgs, TakeArgs};
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
@@ -88,7 +89,7 @@ pub(super) fn record(
     let report = animate(
         Arc::new(rig),
         clip,
-        scene(args),
+        scene(args)?,
         output,
         options,
         &mut |now| {
@@ -102,8 +103,20 @@ pub(super) fn record(
     Ok(report)
 }
 
-fn scene(args: &SceneArgs) -> Scene {
+fn scene(args: &SceneArgs) -> Result<Scene> {
     let mut scene = Scene::default();
+    scene.contact.pairs = match args.contact {
+        ContactPairs::None => PairMask::None,
+        ContactPairs::Sphincter => PairMask::Sphincter,
+        ContactPairs::All => PairMask::All,
+    };
+    scene.contact.sticky_lips = args.sticky_lips.then(Stickiness::default);
+    if let Some(path) = &args.colliders {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("cannot read {}", path.display()))?;
+        scene.colliders =
+            read_colliders(&text).with_context(|| format!("in {}", path.display()))?;
+    }
     if args.without_dynamics {
         scene.dynamics = Dynamics::None;
     }
@@ -116,7 +129,7 @@ fn scene(args: &SceneArgs) -> Scene {
     if let Some(wind) = args.wind {
         scene.wind = wind.into();
     }
-    scene
+    Ok(scene)
 }
 
 pub(super) fn outcome(console: &Console, report: &AnimateReport) -> Outcome {

@@ -13,10 +13,15 @@ use parry3d::shape::{
 use super::{ColliderShape, CollisionError};
 use crate::{Point, Vector};
 
+/// Divisions around the mesh of a round shape.
+const AROUND: u32 = 20;
+
 /// A shape with its mesh.
 pub(crate) struct WorldShape {
     shape: Box<dyn Shape>,
-    /// Vertices and triangles of a shape with flat faces; empty for a round one.
+    /// Whether its surface is smooth, so that nodes are held out of it one by one.
+    pub(crate) is_round: bool,
+    /// Vertices and triangles: its surface, for a round one inside it; empty for a plane.
     pub(crate) mesh: (Vec<Point>, Vec<[u32; 3]>),
     /// Radius about its origin; infinite for a plane. (mm)
     pub(crate) radius: f64,
@@ -58,13 +63,18 @@ impl WorldShape {
         };
         let mut mesh = (Vec::new(), Vec::new());
         let (shape, radius): (Box<dyn Shape>, f64) = match description {
-            ColliderShape::Ball { radius } => (Box::new(Ball::new(*radius as f32)), *radius),
+            ColliderShape::Ball { radius } => {
+                let shape = Ball::new(*radius as f32);
+                mesh = from_parry(shape.to_trimesh(AROUND, AROUND / 2));
+                (Box::new(shape), *radius)
+            }
             ColliderShape::Capsule {
                 half_length,
                 radius,
             } => {
                 let end = ParryVector::new(0.0, *half_length as f32, 0.0);
                 let shape = Capsule::new(-end, end, *radius as f32);
+                mesh = from_parry(shape.to_trimesh(AROUND, AROUND / 2));
                 (Box::new(shape), half_length + radius)
             }
             ColliderShape::Cuboid { half_extents } => {
@@ -101,16 +111,16 @@ impl WorldShape {
             }
             ColliderShape::Plane {} => (Box::new(HalfSpace::new(ParryVector::Y)), f64::INFINITY),
         };
+        let is_round = matches!(
+            description,
+            ColliderShape::Ball { .. } | ColliderShape::Capsule { .. } | ColliderShape::Plane {}
+        );
         Ok(Self {
             shape,
+            is_round,
             mesh,
             radius,
         })
-    }
-
-    /// Whether nodes alone are held out of it: it is round, or flat without end.
-    pub(crate) fn is_smooth(&self) -> bool {
-        self.mesh.1.is_empty()
     }
 
     /// The surface nearest to a point in the shape's own coordinates. (mm)
@@ -131,32 +141,21 @@ impl WorldShape {
         }
     }
 
-    /// A mesh to show or to judge by: of a round shape one that lies inside it.
-    pub(crate) fn shown_mesh(&self, description: &ColliderShape) -> (Vec<Point>, Vec<[u32; 3]>) {
-        match description {
-            ColliderShape::Ball { radius } => {
-                from_parry(Ball::new(*radius as f32).to_trimesh(24, 12))
-            }
-            ColliderShape::Capsule {
-                half_length,
-                radius,
-            } => {
-                let end = ParryVector::new(0.0, *half_length as f32, 0.0);
-                from_parry(Capsule::new(-end, end, *radius as f32).to_trimesh(24, 12))
-            }
-            ColliderShape::Plane {} => {
-                let s = 200.0;
-                let corners = [[-s, -s], [s, -s], [s, s], [-s, s]];
-                (
-                    corners
-                        .iter()
-                        .map(|c| Point::new(c[0], 0.0, c[1]))
-                        .collect(),
-                    vec![[0, 2, 1], [0, 3, 2]],
-                )
-            }
-            _ => self.mesh.clone(),
+    /// A mesh to show or to judge by: of a round shape one that lies inside it, of a plane a
+    /// square.
+    pub(crate) fn shown_mesh(&self) -> (Vec<Point>, Vec<[u32; 3]>) {
+        if !self.mesh.1.is_empty() {
+            return self.mesh.clone();
         }
+        let s = 200.0;
+        let corners = [[-s, -s], [s, -s], [s, s], [-s, s]];
+        (
+            corners
+                .iter()
+                .map(|c| Point::new(c[0], 0.0, c[1]))
+                .collect(),
+            vec![[0, 2, 1], [0, 3, 2]],
+        )
     }
 }
 

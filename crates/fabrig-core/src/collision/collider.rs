@@ -204,6 +204,26 @@ impl Collider {
     }
 }
 
+/// Reads a text of `[[colliders]]` tables (TOML) and checks each.
+///
+/// # Errors
+///
+/// [`CollisionError::Text`] with line and column, [`CollisionError::Collider`].
+pub fn read_colliders(text: &str) -> Result<Vec<Collider>, CollisionError> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Text {
+        colliders: Vec<Collider>,
+    }
+    let text: Text = toml::from_str(text).map_err(|e| CollisionError::Text {
+        reason: e.to_string(),
+    })?;
+    for (index, collider) in text.colliders.iter().enumerate() {
+        collider.check(index)?;
+    }
+    Ok(text.colliders)
+}
+
 /// The pose at `s` from 0 to 1 on the way from `a` to `b`.
 pub(crate) fn between(a: &Isometry3<f64>, b: &Isometry3<f64>, s: f64) -> Isometry3<f64> {
     let turn = (b.rotation * a.rotation.inverse()).scaled_axis() * s;
@@ -235,13 +255,25 @@ mod tests {
     }
 
     #[test]
+    fn colliders_are_read_from_text() {
+        let text = "[[colliders]]\nname = \"finger\"\n\
+                    shape = { type = \"capsule\", half_length = 20.0, radius = 7.0 }\n\
+                    keys = [{ time = 0.0, position = [60.0, -20.0, 90.0] }]\n";
+        let read = read_colliders(text).unwrap_or_default();
+        assert_eq!(read.len(), 1);
+        assert_eq!(read[0].frame, ColliderFrame::World);
+        assert!(read_colliders("[[colliders]]\nname = 3").is_err());
+    }
+
+    #[test]
     fn bad_colliders_are_refused_with_their_index() {
         let good = Collider::at("ball", ColliderShape::Ball { radius: 5.0 }, Vector::zeros());
         let mut cases = vec![good.clone(); 4];
         cases[0].shape = ColliderShape::Ball { radius: -1.0 };
         cases[1].friction = f64::NAN;
         cases[2].keys.clear();
-        cases[3].keys.push(cases[3].keys[0]);
+        let same = cases[3].keys[0];
+        cases[3].keys.push(same);
         for bad in cases {
             let text = bad
                 .check(3)

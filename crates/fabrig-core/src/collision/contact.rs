@@ -52,8 +52,8 @@ pub struct ContactBody {
 /// # Limitations
 ///
 /// - Contact is rigid: no restitution, no rolling friction.
-/// - Round colliders hold nodes, not the triangles between them: one that is smaller than a
-///   cell of the grid can slip between nodes. Give such a thing as a hull.
+/// - Round colliders hold nodes out of their round surface, and cells out of a mesh of twenty
+///   divisions inside it.
 /// - Between two colliders that meet, something must give: pairs caught there are counted as
 ///   pinched.
 #[derive(Debug)]
@@ -77,6 +77,12 @@ pub struct Contact {
     pub(super) part_of: Vec<u32>,
     /// How far nodes of a part may go before it is looked at anew. (mm)
     pub(super) budgets: Vec<f32>,
+    /// Largest travel of each part. (mm)
+    pub(super) furthest: Vec<f32>,
+    /// The same of wanted positions alone, in the pass before. (mm)
+    pub(super) last_furthest: Vec<f32>,
+    /// Parts in which something is pushed in this pass.
+    pub(super) is_pushed: Vec<bool>,
     pub(super) lists: Vec<PairList>,
     /// Bodies of the face, then colliders.
     pub(super) world: Vec<WorldCollider>,
@@ -87,6 +93,7 @@ pub struct Contact {
     pub(super) was_touched: Vec<bool>,
     pub(super) is_touched: Vec<bool>,
     pub(super) carried_by: Vec<u32>,
+    pub(super) has_carried: bool,
     pub(super) moved: Vec<u32>,
     pub(super) stopped: Vec<bool>,
     pub(super) points: Vec<ContactPoint>,
@@ -151,7 +158,9 @@ impl Contact {
         }
         let cloth_parts = parts.len();
         for (index, collider) in world.iter_mut().enumerate() {
-            if collider.shape.is_smooth() {
+            // The face's own bodies are larger than cells, and planes have no mesh.
+            let has_mesh = !collider.shape.mesh.1.is_empty();
+            if !has_mesh || (index < body_count && collider.shape.is_round) {
                 continue;
             }
             let (vertices, triangles) = &collider.shape.mesh;
@@ -186,6 +195,9 @@ impl Contact {
             travel: vec![f32::INFINITY; count],
             part_of,
             budgets: vec![-1.0; parts.len()],
+            furthest: vec![0.0; parts.len()],
+            last_furthest: vec![0.0; parts.len()],
+            is_pushed: vec![false; parts.len()],
             stopped: vec![false; cloth_parts],
             parts,
             rest,
@@ -201,6 +213,7 @@ impl Contact {
             was_touched: vec![false; cloth_count],
             is_touched: vec![false; cloth_count],
             carried_by: vec![u32::MAX; cloth_count],
+            has_carried: false,
             moved: Vec::new(),
             points: Vec::new(),
             report: ContactReport {

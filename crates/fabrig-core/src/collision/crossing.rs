@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn columns_lose_no_pair() {
-        use rand::{Rng, SeedableRng};
+        use rand::{RngExt, SeedableRng};
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
         let mut positions = Vec::new();
         let mut triangles = Vec::new();

@@ -12,12 +12,20 @@
 use super::contact::{Contact, PASS_LENGTH};
 use super::distance::{PairKind, closest_weights, weighted, wide};
 use super::judge::Side;
+use super::project::Active;
 use crate::Vector;
 
 /// How far projection may move nodes before candidates are collected again. (mm)
 pub(super) const MARGIN: f64 = 0.15;
 /// Smallest and largest budget. (mm)
-const BUDGETS: [f32; 2] = [0.35, 2.5];
+const BUDGETS: [f32; 2] = [0.3, 2.5];
+
+/// Share of the distance at rest that is kept, where that is less than the thickness.
+const REST_SHARE: f64 = 0.5;
+
+/// What is kept from the mesh inside a round collider, which only stops cells that are
+/// stretched across it: nodes are held out by its round surface. (mm)
+const GUARD_THICKNESS: f64 = 0.05;
 
 /// A pair of elements that may collide.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +47,8 @@ pub(crate) struct PairList {
     /// The collider that `b` is of.
     pub(crate) collider: Option<usize>,
     pub(crate) candidates: Vec<Candidate>,
+    /// Smallest distance at the references beyond the thickness, of all candidates. (mm)
+    pub(crate) spare: f32,
 }
 
 impl PairList {
@@ -49,6 +59,7 @@ impl PairList {
             friction,
             collider,
             candidates: Vec::new(),
+            spare: f32::INFINITY,
         }
     }
 }
@@ -61,16 +72,20 @@ impl Contact {
         let mut any = false;
         for (index, part) in self.parts.iter().enumerate() {
             let range = part.first as usize..(part.first + part.count) as usize;
-            let mut furthest = 0.0_f32;
-            let nodes = self.wanted[range.clone()]
-                .iter()
-                .zip(&self.positions[range.clone()])
-                .zip(&self.reference[range.clone()]);
-            for (travel, ((w, x), r)) in self.travel[range].iter_mut().zip(nodes) {
-                let squared = (w - r).norm_squared().max((x - r).norm_squared());
-                *travel = squared.sqrt();
-                furthest = furthest.max(*travel);
+            let mut squared = 0.0_f32;
+            let reference = &self.reference[range.clone()];
+            for (w, r) in self.wanted[range.clone()].iter().zip(reference) {
+                squared = squared.max((w - r).norm_squared());
             }
+            // Where nothing was pushed, nodes are where they were wanted in the pass before.
+            let mut furthest = squared.sqrt().max(self.last_furthest[index]);
+            if self.is_pushed[index] {
+                let now = self.positions[range].iter().zip(reference);
+                let most = now.fold(0.0_f32, |m, (x, r)| m.max((x - r).norm_squared()));
+                furthest = furthest.max(most.sqrt());
+            }
+            self.last_furthest[index] = squared.sqrt();
+            self.furthest[index] = furthest;
             if !(furthest <= self.budgets[index]) {
                 stale[index] = true;
                 any = true;
@@ -102,11 +117,12 @@ impl Contact {
         let mut furthest = 0.0_f32;
         for i in range {
             let way = (self.wanted[i] - self.positions[i]).norm();
-            self.travel[i] = way;
             furthest = furthest.max(way);
         }
+        self.furthest[index] = furthest;
+        self.last_furthest[index] = furthest;
         let [least, most] = BUDGETS;
-        self.budgets[index] = (3.0 * furthest)
+        self.budgets[index] = (2.5 * furthest)
             .clamp(least, most)
             .max(1.01 * furthest + MARGIN as f32);
         part.tree.refit(&part.cells, &self.reference);
@@ -114,8 +130,10 @@ impl Contact {
 
     /// How much two elements keep apart at most, over a whole list. (mm)
     fn thickest(&self, list: &PairList) -> f64 {
-        if list.collider.is_none() {
-            return self.options.thickness;
+        match list.collider {
+            None => return self.options.thickness,
+            Some(c) if self.world[c].shape.is_round => return GUARD_THICKNESS,
+            Some(_) => {}
         }
         let part = &self.parts[list.a];
         let covers = &self.cover[part.first as usize..(part.first + part.count) as usize];
@@ -134,7 +152,9 @@ impl Contact {
             a.tree.near_cells(&b.tree, reach as f32, cells);
         }
         let is_cloth = list.collider.is_none();
-        let out = &mut list.candidates;
+        let is_round = list.collider.is_some_and(|c| self.world[c].shape.is_round);
+        let (out, spare) = (&mut list.candidates, &mut list.spare);
+        *spare = f32::INFINITY;
         let mut offer = |kind: PairKind, nodes: [u32; 4]| {
             let (first, second) = nodes.split_at(kind.first_count());
             if own && self.rules.side(a, first, second) != Side::Apart {
@@ -143,6 +163,8 @@ impl Contact {
             let at = nodes.map(|n| wide(&self.reference[n as usize]));
             let thickness = if is_cloth {
                 self.options.thickness
+            } else if is_round {
+                GUARD_THICKNESS
             } else {
                 self.covered(&nodes)
             };
@@ -159,6 +181,7 @@ impl Contact {
             } else {
                 thickness
             };
+            *spare = spare.min((distance - thickness) as f32);
             out.push(Candidate {
                 nodes,
                 kind,
@@ -195,36 +218,58 @@ impl Contact {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// The thickness, or nearly the distance at rest where that is less. (mm)
+    /// The thickness, or half the distance at rest where that is less. (mm)
     fn at_most_rest(&self, kind: PairKind, nodes: &[u32; 4]) -> f64 {
         let at = nodes.map(|n| wide(&self.rest[n as usize]));
         let rest = weighted(&closest_weights(kind, &at), &at).norm();
-        self.options.thickness.min(0.9 * rest)
+        self.options.thickness.min(REST_SHARE * rest)
     }
 
-    /// Candidates that may come nearer than their thickness on the way to `wanted`.
-    pub(super) fn collect(&mut self) {
+    /// Finds candidates that may come nearer than their thickness on the way to `wanted`.
+    ///
+    /// First without allowance, to see which parts are in contact at all; then, for these, with
+    /// what pushing them apart may add. `everything` takes all parts for that.
+    pub(super) fn collect(&mut self, everything: bool) {
         self.actives.clear();
-        for (index, list) in self.lists.iter().enumerate() {
+        self.is_pushed.fill(everything);
+        for s in &self.smooth {
+            self.is_pushed[self.part_of[s.node as usize] as usize] = true;
+        }
+        for b in &self.bonds {
+            self.is_pushed[self.part_of[b.nodes[0] as usize] as usize] = true;
+        }
+        let mut has_travel = vec![false; self.parts.len()];
+        let lists = std::mem::take(&mut self.lists);
+        if !everything {
+            for list in &lists {
+                if self.is_pushed[list.a] && self.is_pushed[list.b] || self.is_far(list, 0.0) {
+                    continue;
+                }
+                self.measure_travel(list.a, &mut has_travel);
+                self.measure_travel(list.b, &mut has_travel);
+                if list
+                    .candidates
+                    .iter()
+                    .any(|c| self.may_close(c, 0.0).is_some())
+                {
+                    self.is_pushed[list.a] = true;
+                    self.is_pushed[list.b] = true;
+                }
+            }
+        }
+        for (index, list) in lists.iter().enumerate() {
+            let is_pushed = self.is_pushed[list.a] || self.is_pushed[list.b];
+            if !is_pushed || self.is_far(list, 2.0 * MARGIN) {
+                continue;
+            }
+            self.measure_travel(list.a, &mut has_travel);
+            self.measure_travel(list.b, &mut has_travel);
             for c in &list.candidates {
-                let [t0, t1, t2, t3] = c.nodes.map(|n| self.travel[n as usize]);
-                let travel = match c.kind {
-                    PairKind::VertexTriangle => t0 + t1.max(t2).max(t3),
-                    PairKind::EdgeEdge => t0.max(t1) + t2.max(t3),
+                let Some((weights, r)) = self.may_close(c, 2.0 * MARGIN) else {
+                    continue;
                 };
-                let limit = c.thickness + 2.0 * MARGIN as f32;
-                if c.distance - travel > limit {
-                    continue;
-                }
-                let at = c.nodes.map(|n| wide(&self.positions[n as usize]));
-                let weights = closest_weights(c.kind, &at);
-                let r = weighted(&weights, &at);
                 let distance = r.norm();
-                let to = c.nodes.map(|n| wide(&self.wanted[n as usize]));
-                if distance - approach(c.kind, &at, &to) > f64::from(limit) {
-                    continue;
-                }
-                self.actives.push(super::project::Active {
+                self.actives.push(Active {
                     nodes: c.nodes,
                     kind: c.kind,
                     weights,
@@ -236,6 +281,47 @@ impl Contact {
                 });
             }
         }
+        self.lists = lists;
+    }
+
+    /// Whether nothing in a list can come within `more` of its thickness.
+    fn is_far(&self, list: &PairList, more: f64) -> bool {
+        list.spare - self.furthest[list.a] - self.furthest[list.b] > more as f32
+    }
+
+    /// Measures how far each node of a part is from its reference, now and as wanted.
+    fn measure_travel(&mut self, index: usize, has_travel: &mut [bool]) {
+        if std::mem::replace(&mut has_travel[index], true) {
+            return;
+        }
+        let part = &self.parts[index];
+        for i in part.first as usize..(part.first + part.count) as usize {
+            let r = &self.reference[i];
+            let squared = (self.wanted[i] - r)
+                .norm_squared()
+                .max((self.positions[i] - r).norm_squared());
+            self.travel[i] = squared.sqrt();
+        }
+    }
+
+    /// Weights and vector between the closest points of a candidate, if it may come within
+    /// `more` of its thickness on the way.
+    #[inline]
+    fn may_close(&self, c: &Candidate, more: f64) -> Option<([f64; 4], Vector)> {
+        let [t0, t1, t2, t3] = c.nodes.map(|n| self.travel[n as usize]);
+        let travel = match c.kind {
+            PairKind::VertexTriangle => t0 + t1.max(t2).max(t3),
+            PairKind::EdgeEdge => t0.max(t1) + t2.max(t3),
+        };
+        let limit = c.thickness + more as f32;
+        if c.distance - travel > limit {
+            return None;
+        }
+        let at = c.nodes.map(|n| wide(&self.positions[n as usize]));
+        let to = c.nodes.map(|n| wide(&self.wanted[n as usize]));
+        let weights = closest_weights(c.kind, &at);
+        let r = weighted(&weights, &at);
+        (r.norm() - approach(c.kind, &at, &to) <= f64::from(limit)).then_some((weights, r))
     }
 }
 

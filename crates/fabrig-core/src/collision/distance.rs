@@ -125,7 +125,7 @@ pub(crate) fn wide(p: &nalgebra::Point3<f32>) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::{RngExt, SeedableRng};
 
     /// The smallest distance over a fine lattice of places on both elements.
     fn by_search(kind: PairKind, x: &[Vector; 4]) -> f64 {

@@ -1,6 +1,12 @@
 /// What can be wrong with contact.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CollisionError {
+    /// A text of colliders cannot be read.
+    #[error("colliders: {reason}")]
+    Text {
+        /// What is wrong, with line and column.
+        reason: String,
+    },
     /// A collider cannot be what it says.
     #[error("collider {index} (`{name}`): {reason}")]
     Collider {

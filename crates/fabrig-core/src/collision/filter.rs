@@ -21,16 +21,20 @@ const HALVINGS: usize = 6;
 const ROUNDS: usize = 200;
 /// Share of its distance that a pair keeps in a pass.
 const KEPT: f64 = 0.1;
+/// Pairs nearer than this come no nearer: stored positions are not finer. (mm)
+const NEAREST: f64 = 5e-5;
 
 impl Contact {
     /// One pass: from `positions` to `wanted`, or as far as that is safe.
     ///
     /// - `force_per_shift`: what a shift of a node of 1 g by 1 mm takes (N)
     pub(super) fn pass(&mut self, force_per_shift: f64, passes: usize) {
-        self.carried_by.fill(u32::MAX);
+        if std::mem::take(&mut self.has_carried) {
+            self.carried_by.fill(u32::MAX);
+        }
         self.refresh_candidates();
-        self.collect();
         self.collect_smooth();
+        self.collect(false);
         if !self.actives.is_empty() || !self.smooth.is_empty() || !self.bonds.is_empty() {
             let pushes = self.project_within(force_per_shift);
             self.make_safe(pushes);
@@ -55,9 +59,11 @@ impl Contact {
             .map(|n| (n, wide(&self.wanted[n as usize])))
             .collect();
         self.project(force_per_shift);
-        touched
-            .iter()
-            .any(|(n, before)| (wide(&self.wanted[*n as usize]) - before).norm() > MARGIN)
+        touched.iter().any(|(n, before)| {
+            let i = *n as usize;
+            let way = (wide(&self.wanted[i]) - before).norm();
+            way > MARGIN || (way > 0.0 && !self.is_pushed[self.part_of[i] as usize])
+        })
     }
 
     fn make_safe(&mut self, mut went_far: bool) {
@@ -72,7 +78,7 @@ impl Contact {
                     .copied()
                     .collect();
                 self.refresh_candidates();
-                self.collect();
+                self.collect(true);
                 self.remember(&pushes);
                 went_far = false;
             }
@@ -166,6 +172,7 @@ impl Contact {
         let local = c.pose_before.inverse() * crate::Point::from(wide(&self.positions[node]));
         self.wanted[node] = narrow(&(c.pose * local).coords);
         self.carried_by[node] = collider as u32;
+        self.has_carried = true;
         self.report.carried += 1;
     }
 
@@ -196,14 +203,24 @@ impl Contact {
     fn is_safe(&self, a: &Active) -> bool {
         let at = a.nodes.map(|n| wide(&self.positions[n as usize]));
         let to = a.nodes.map(|n| wide(&self.wanted[n as usize]));
-        stays_apart(a.kind, &at, &to, a.distance)
+        stays_beside(a, &to) || stays_apart(a.kind, &at, &to, a.distance)
     }
+}
+
+/// Whether the plane between two elements still parts them at the end: then it does all along
+/// the straight ways there.
+fn stays_beside(a: &Active, to: &[Vector; 4]) -> bool {
+    let height = to.map(|x| a.normal.dot(&(x - to[0])));
+    let (first, second) = height.split_at(a.kind.first_count());
+    let lowest = first.iter().fold(f64::INFINITY, |m, &h| m.min(h));
+    let highest = second.iter().fold(f64::NEG_INFINITY, |m, &h| m.max(h));
+    lowest - highest >= (KEPT * a.distance).max(NEAREST.min(a.distance))
 }
 
 /// Whether a pair `distance` apart keeps a share of that on the way from `at` to `to`.
 fn stays_apart(kind: PairKind, at: &[Vector; 4], to: &[Vector; 4], distance: f64) -> bool {
     let nearer = approach(kind, at, to);
-    let floor = KEPT * distance;
+    let floor = (KEPT * distance).max(NEAREST.min(distance));
     if nearer <= distance - floor {
         return true;
     }

@@ -13,7 +13,7 @@ pub struct Verdict {
     pub cloth: usize,
     /// Crossings of patches with colliders.
     pub colliders: usize,
-    /// Folds: crossings of a patch with its own next cells, which contact leaves to bending.
+    /// Folds: crossings of a patch with its own next two cells, which contact leaves to bending.
     pub folds: usize,
 }
 
@@ -93,7 +93,7 @@ impl Contact {
 pub(crate) enum Side {
     /// They are held apart.
     Apart,
-    /// They are within a cell of each other.
+    /// They are within two cells of each other.
     Neighbours,
     /// They are where the patch crosses itself at rest.
     Excused,

@@ -5,6 +5,9 @@ use std::collections::BTreeSet;
 use super::tree::Tree;
 use crate::anatomy::GridShape;
 
+/// Nodes within this many cells of each other in a grid are neighbours.
+const NEXT_CELLS: u32 = 2;
+
 /// A cell of a part and the elements that it owns; every element is owned by one cell.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
@@ -110,8 +113,8 @@ impl Part {
         }
     }
 
-    /// Whether two nodes of this part are so near in the grid (within one cell of each other)
-    /// that its constraints keep them apart, not contact.
+    /// Whether two nodes of this part are so near in the grid, within [`NEXT_CELLS`] of each
+    /// other, that its constraints keep them apart, not contact.
     #[inline]
     pub(crate) fn are_neighbours(&self, a: u32, b: u32) -> bool {
         let Some(shape) = self.grid else {
@@ -124,7 +127,7 @@ impl Part {
         if shape.is_periodic {
             du = du.min(shape.u_count - du);
         }
-        du <= 1 && va.abs_diff(vb) <= 1
+        du <= NEXT_CELLS && va.abs_diff(vb) <= NEXT_CELLS
     }
 
     /// All triangles, cell after cell.

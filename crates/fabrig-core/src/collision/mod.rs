@@ -44,7 +44,10 @@ mod sticky;
 mod tree;
 mod world;
 
-pub use collider::{Collider, ColliderFrame, ColliderKey, ColliderShape};
+#[cfg(test)]
+mod tests;
+
+pub use collider::{Collider, ColliderFrame, ColliderKey, ColliderShape, read_colliders};
 pub use contact::{Contact, ContactBody, ContactPatch};
 pub use crossing::{Crossing, crossings, edges_of};
 pub use error::CollisionError;

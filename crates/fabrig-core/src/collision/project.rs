@@ -70,7 +70,7 @@ impl Contact {
     pub(super) fn collect_smooth(&mut self) {
         self.smooth.clear();
         for (index, c) in self.world.iter().enumerate() {
-            if !c.shape.is_smooth() {
+            if !c.shape.is_round {
                 continue;
             }
             let inverse = c.pose.inverse();

@@ -1,6 +1,6 @@
 //! Which elements may collide at all.
 //!
-//! - A patch collides with itself, except elements within one cell of each other in its grid:
+//! - A patch collides with itself, except elements within two cells of each other in its grid:
 //!   stretch, shear and bending keep those apart.
 //! - Two patches collide unless they are attached to each other (they are then one tissue,
 //!   held at the offset of their targets) or cross at rest (interwoven fibres, as where the
@@ -86,7 +86,7 @@ impl Rules {
         rules
     }
 
-    /// Excuses everything within a cell of two elements from each other.
+    /// Excuses the neighbours of two elements from each other.
     fn excuse(&mut self, part: &Part, edge: &[u32], triangle: &[u32]) {
         let around = |nodes: &[u32]| -> Vec<u32> {
             (part.first..part.first + part.count)

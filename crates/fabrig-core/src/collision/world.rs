@@ -201,6 +201,5 @@ pub fn collider_mesh(
     index: usize,
 ) -> Result<(Vec<Point>, Vec<[u32; 3]>), CollisionError> {
     collider.check(index)?;
-    let shape = WorldShape::new(&collider.shape, index, &collider.name)?;
-    Ok(shape.shown_mesh(&collider.shape))
+    Ok(WorldShape::new(&collider.shape, index, &collider.name)?.shown_mesh())
 }
