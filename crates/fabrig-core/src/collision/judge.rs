@@ -7,7 +7,7 @@ use super::crossing::{crossings, edges_of};
 use super::{Collider, CollisionError, collider_mesh};
 
 /// Crossings among everything that may collide.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Verdict {
     /// Crossings of patches with each other and themselves.
     pub cloth: usize,
