@@ -21,8 +21,8 @@
 pub mod anatomy;
 pub mod atomic_file;
 pub mod cloth;
-pub mod edit;
 pub mod collision;
+pub mod edit;
 mod error;
 pub mod facs;
 pub mod mesh;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use fabrig_core::edit::{Edits, edits_path};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
+use fabrig_core::edit::{Edits, edits_path};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
 use fabrig_core::rig::Rig;

@@ -84,11 +84,14 @@ impl WorldShape {
             }
             ColliderShape::ConvexHull { points } => {
                 let points: Vec<ParryVector> = points.iter().map(|p| to_parry(&p.coords)).collect();
-                let shape = ConvexPolyhedron::from_convex_hull(&points).ok_or_else(|| {
-                    refuse("its points span no volume; give four or more that do".to_owned())
-                })?;
+                let flat =
+                    || refuse("its points span no volume; give four or more that do".to_owned());
+                let shape = ConvexPolyhedron::from_convex_hull(&points).ok_or_else(flat)?;
                 mesh = from_parry(shape.to_trimesh());
                 let radius = radius_of(&mesh.0);
+                if volume_of(&mesh) < 1e-6 * radius.powi(3) {
+                    return Err(flat());
+                }
                 (Box::new(shape), radius)
             }
             ColliderShape::TriangleMesh {
@@ -172,6 +175,16 @@ fn from_parry(
 
 fn radius_of(vertices: &[Point]) -> f64 {
     vertices.iter().map(|p| p.coords.norm()).fold(0.0, f64::max)
+}
+
+/// Volume inside a closed surface. [mm^3]
+fn volume_of((vertices, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> f64 {
+    let corner = |v: u32| vertices[v as usize].coords;
+    let sum: f64 = triangles
+        .iter()
+        .map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))))
+        .sum();
+    sum.abs() / 6.0
 }
 
 /// An edge without its opposite, if the triangles do not close.

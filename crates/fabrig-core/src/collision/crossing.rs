@@ -235,7 +235,7 @@ mod tests {
         let mut positions = Vec::new();
         let mut triangles = Vec::new();
         for t in 0..200_u32 {
-            let c: [f32; 3] = [0; 3].map(|_| random.random_range(-10.0..10.0));
+            let c: [f32; 3] = [0; 3].map(|_| random.random_range(-4.0..4.0));
             for _ in 0..3 {
                 positions.push(Point3::from(c.map(|x| x + random.random_range(-2.0..2.0))));
             }

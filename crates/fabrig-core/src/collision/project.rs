@@ -249,14 +249,17 @@ impl Contact {
             }
             let force = a.push / sum.max(1e-9) * mass * force_per_shift;
             let collider = self.lists[a.list as usize].collider;
+            // From the collider to the face, whichever of the two has the vertex.
+            let is_turned = collider.is_some() && a.nodes[0] as usize >= self.cloth_count;
+            let normal = if is_turned { -a.normal } else { a.normal };
             self.points.push(ContactPoint {
                 position: narrow(&at),
-                normal: a.normal,
+                normal,
                 force,
                 collider: collider.and_then(|c| c.checked_sub(self.body_count)),
             });
             if let Some(c) = collider.and_then(|c| c.checked_sub(self.body_count)) {
-                self.report.forces[c] -= a.normal * force;
+                self.report.forces[c] -= normal * force;
             }
         }
         for s in &self.smooth {
