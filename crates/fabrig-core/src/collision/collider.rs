@@ -179,7 +179,7 @@ impl Collider {
                 "sizes must be positive, finite and under 100 m, got {bad}"
             ));
         }
-        if !(self.friction >= 0.0 && self.friction <= 10.0) {
+        if !(0.0..=10.0).contains(&self.friction) {
             return refuse(format!(
                 "friction must be from 0 to 10, got {}",
                 self.friction

@@ -86,7 +86,7 @@ impl Contact {
             }
             self.last_furthest[index] = squared.sqrt();
             self.furthest[index] = furthest;
-            if !(furthest <= self.budgets[index]) {
+            if furthest > self.budgets[index] {
                 stale[index] = true;
                 any = true;
             }
