@@ -16,6 +16,9 @@ use serde_json::Value;
 use crate::arrays::{self, Grid};
 use crate::errors::{input, to_py};
 
+/// Patch, other patch, pairs of their nodes, strength.
+type PairArgument = (u32, u32, Vec<(u32, u32)>, f64);
+
 /// Cloth patches drawn to moving targets, without a face: a grid each, with stretch, shear,
 /// bend and pressure. Lengths in mm, times in seconds, +Y up.
 ///
@@ -61,7 +64,7 @@ impl PyCloth {
         periodic: Option<&Bound<'_, PyAny>>,
         anchors: Option<Vec<Option<Vec<i64>>>>,
         anchor_strength: f64,
-        pairs: Option<Vec<(u32, u32, Vec<(u32, u32)>, f64)>>,
+        pairs: Option<Vec<PairArgument>>,
         substeps: Option<u32>,
         rest_blend: Option<f64>,
         rest_imperfection: Option<f64>,
