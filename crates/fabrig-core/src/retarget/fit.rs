@@ -7,9 +7,10 @@
 //! `0 <= w_t <= 1`
 //!
 //! Each frame is a box-constrained quadratic problem ([`solve_box_qp`]), linearized where it
-//! stands and corrected by evaluating the rig, started from the frame before. A first pass
-//! goes forward with the frame before held; further passes, back and forth, hold both
-//! neighbours, so that smoothing does not lag.
+//! stands and corrected by evaluating the rig, started from the frame before. With one pass
+//! the frame before is held. With more, the first fits every frame by itself and the others go
+//! back and forth and hold both neighbours, so that smoothing does not lag; only the first
+//! and the last evaluate the rig.
 //!
 //! The three factors follow from what the numbers mean: with noise s of a coordinate, N sites,
 //! typical weights b and typical rates v, `r = s^2 / (N b^2)`, `l1 = s^2 / (N b)`,
@@ -56,13 +57,14 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    /// For marker trajectories.
+    /// For marker trajectories. Weights are expected to be large: some units move no marker by
+    /// more than two or three times its noise, and what draws them to 0 would hide them.
     pub fn markers() -> Self {
         Self {
             noise: 0.5,
             typical_rate: 2.0,
-            is_sparse: true,
-            passes: 3,
+            typical_weight: 0.5,
+            passes: 12,
             ..Self::default()
         }
     }
@@ -148,8 +150,20 @@ pub fn fit_clip(
     options.check()?;
     check(model, frames)?;
     let mut fit = Fit::new(model, frames, options);
-    for pass in 0..options.passes.max(1) {
+    let passes = options.passes.max(1);
+    for pass in 0..passes {
         let count = frames.len();
+        let holds = match pass {
+            0 if passes == 1 => Holds::Previous,
+            0 => Holds::Nothing,
+            _ => Holds::Both,
+        };
+        let rounds = match pass {
+            0 => options.linearizations.max(1),
+            // The last pass answers for the rig as it is.
+            _ if pass + 1 == passes => 1,
+            _ => 0,
+        };
         for step in 0..count {
             // Every other pass goes back, so that news travels both ways.
             let frame = if pass % 2 == 0 {
@@ -157,7 +171,10 @@ pub fn fit_clip(
             } else {
                 count - 1 - step
             };
-            fit.frame(frame, pass)?;
+            if pass == 0 && frame > 0 {
+                fit.values[frame] = fit.values[frame - 1].clone();
+            }
+            fit.frame(frame, rounds, holds)?;
         }
     }
     fit.finish()
@@ -189,6 +206,23 @@ fn check(model: &ResponseModel, frames: &[FitFrame]) -> Result<(), RetargetError
     Ok(())
 }
 
+/// Neighbours that a frame is drawn to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Nothing,
+    Previous,
+    Both,
+}
+
+/// A frame's data term about the values at which the rig was evaluated last.
+struct Linearization {
+    opening: usize,
+    /// `J'(d - x(w)) + J'J w` over the sites seen, by their number.
+    linear: DVector<f64>,
+    /// One by the number of sites seen.
+    scale: f64,
+}
+
 struct Fit<'a> {
     model: &'a mut ResponseModel,
     frames: &'a [FitFrame],
@@ -198,6 +232,8 @@ struct Fit<'a> {
     /// Controls that can be seen.
     seen: Vec<bool>,
     values: Vec<DVector<f64>>,
+    /// `None` where no site is seen.
+    linearizations: Vec<Option<Linearization>>,
     kkt: Vec<f64>,
 }
 
@@ -214,6 +250,7 @@ impl<'a> Fit<'a> {
             normals,
             seen,
             values: vec![DVector::zeros(count); frames.len()],
+            linearizations: frames.iter().map(|_| None).collect(),
             kkt: vec![0.0; frames.len()],
             model,
             frames,
@@ -221,58 +258,77 @@ impl<'a> Fit<'a> {
         }
     }
 
-    fn frame(&mut self, frame: usize, pass: usize) -> Result<(), RetargetError> {
-        let count = self.model.controls().count();
-        let first_pass = pass == 0;
-        if first_pass && frame > 0 {
-            self.values[frame] = self.values[frame - 1].clone();
+    /// Solves a frame, after evaluating the rig anew up to `rounds` times.
+    fn frame(&mut self, frame: usize, rounds: usize, holds: Holds) -> Result<(), RetargetError> {
+        if rounds == 0 {
+            self.solve(frame, holds)?;
         }
-        let rounds = if first_pass {
-            self.options.linearizations.max(1)
-        } else {
-            1
-        };
         for _ in 0..rounds {
-            let values = self.values[frame].clone();
-            let now = self.model.displacements(values.as_slice())?;
-            let (opening, response) = self.model.response(values.as_slice())?;
-            let wanted = &self.frames[frame].displacements;
-            let seen_sites = wanted.iter().flatten().count();
-            if seen_sites == 0 {
-                break;
-            }
-            let mut residual = DVector::zeros(3 * wanted.len());
-            let mut normal = self.normals[opening].clone();
-            for (site, (wanted, now)) in wanted.iter().zip(&now).enumerate() {
-                match wanted {
-                    Some(d) => residual.fixed_rows_mut::<3>(3 * site).copy_from(&(d - now)),
-                    None => {
-                        let rows = response.fixed_rows::<3>(3 * site);
-                        normal -= rows.transpose() * rows;
-                    }
-                }
-            }
-            let scale = 1.0 / seen_sites as f64;
-            let mut hessian = normal * scale;
-            let mut linear = response.tr_mul(&residual) * scale + &hessian * &values;
-            self.add_priors(frame, first_pass, scale, &mut hessian, &mut linear);
-            let problem = self.without_unseen(BoxQp { hessian, linear });
-            let solution = solve_box_qp(&problem, &values)?;
-            let moved = (&solution.weights - &values).amax();
-            self.kkt[frame] = solution.kkt_residual;
-            self.values[frame] = solution.weights;
+            self.linearize(frame)?;
+            let moved = self.solve(frame, holds)?;
             if moved < 1e-5 {
                 break;
             }
         }
-        debug_assert_eq!(self.values[frame].len(), count);
         Ok(())
+    }
+
+    fn linearize(&mut self, frame: usize) -> Result<(), RetargetError> {
+        let values = &self.values[frame];
+        let now = self.model.displacements(values.as_slice())?;
+        let (opening, response) = self.model.response(values.as_slice())?;
+        let wanted = &self.frames[frame].displacements;
+        let seen_sites = wanted.iter().flatten().count();
+        let mut residual = DVector::zeros(3 * wanted.len());
+        for (site, (wanted, now)) in wanted.iter().zip(&now).enumerate() {
+            if let Some(d) = wanted {
+                residual.fixed_rows_mut::<3>(3 * site).copy_from(&(d - now));
+            }
+        }
+        let slope = response.tr_mul(&residual);
+        let scale = 1.0 / seen_sites.max(1) as f64;
+        let linear = (slope + self.normal(frame, opening) * values) * scale;
+        self.linearizations[frame] = (seen_sites > 0).then_some(Linearization {
+            opening,
+            linear,
+            scale,
+        });
+        Ok(())
+    }
+
+    /// `J'J` over the sites that a frame shows.
+    fn normal(&self, frame: usize, opening: usize) -> DMatrix<f64> {
+        let response = &self.model.responses()[opening];
+        let mut normal = self.normals[opening].clone();
+        for (site, wanted) in self.frames[frame].displacements.iter().enumerate() {
+            if wanted.is_none() {
+                let rows = response.fixed_rows::<3>(3 * site);
+                normal -= rows.transpose() * rows;
+            }
+        }
+        normal
+    }
+
+    /// Returns how far the values moved.
+    fn solve(&mut self, frame: usize, holds: Holds) -> Result<f64, RetargetError> {
+        let Some(found) = &self.linearizations[frame] else {
+            return Ok(0.0);
+        };
+        let mut hessian = self.normal(frame, found.opening) * found.scale;
+        let mut linear = found.linear.clone();
+        self.add_priors(frame, holds, found.scale, &mut hessian, &mut linear);
+        let problem = self.without_unseen(BoxQp { hessian, linear });
+        let solution = solve_box_qp(&problem, &self.values[frame])?;
+        let moved = (&solution.weights - &self.values[frame]).amax();
+        self.kkt[frame] = solution.kkt_residual;
+        self.values[frame] = solution.weights;
+        Ok(moved)
     }
 
     fn add_priors(
         &self,
         frame: usize,
-        first_pass: bool,
+        holds: Holds,
         scale: f64,
         hessian: &mut DMatrix<f64>,
         linear: &mut DVector<f64>,
@@ -297,10 +353,10 @@ impl<'a> Fit<'a> {
                 linear.axpy(lt, &self.values[other], 1.0);
             }
         };
-        if frame > 0 {
+        if frame > 0 && holds != Holds::Nothing {
             hold(frame - 1);
         }
-        if !first_pass && frame + 1 < self.frames.len() {
+        if frame + 1 < self.frames.len() && holds == Holds::Both {
             hold(frame + 1);
         }
         for i in 0..hessian.nrows() {
