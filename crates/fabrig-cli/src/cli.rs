@@ -207,7 +207,7 @@ pub(crate) struct SceneArgs {
     /// Which patches collide
     #[arg(long, value_enum, default_value_t = ContactPairs::None)]
     pub(crate) contact: ContactPairs,
-    /// Things that the face can touch: a TOML file of [[colliders]]
+    /// Things that the face can touch: a TOML file of `colliders` tables
     #[arg(long, value_name = "COLLIDERS.toml")]
     pub(crate) colliders: Option<PathBuf>,
     /// Let lips stick to each other

@@ -179,7 +179,7 @@ impl ActionUnitTable {
     /// # Errors
     ///
     /// [`FacsError`] for malformed text, a coefficient that is not finite, or a corrective of
-    /// a unit that is not there. Whether the shapes exist shows in [`ActionUnitMap::new`].
+    /// a unit that is not there. Whether the shapes exist shows in [`ActionUnitMap::new`](super::ActionUnitMap::new).
     pub fn parse(text: &str) -> Result<Self, FacsError> {
         let table: TableText = toml::from_str(text).map_err(|error| FacsError::Syntax {
             message: error.to_string().trim().replace('\n', " "),

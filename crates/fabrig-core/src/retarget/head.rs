@@ -24,7 +24,7 @@ pub struct SiteMotion {
     pub times: Vec<f64>,
     /// Each site when the face is neutral. [mm, head frame]
     pub neutral: Vec<Point>,
-    /// Each site in every frame [mm], `None` where it is not seen.
+    /// Each site in every frame (mm), `None` where it is not seen.
     pub positions: Vec<Vec<Option<Point>>>,
     /// The positions move with the head; otherwise they are in the head frame already.
     pub has_head_motion: bool,
