@@ -72,9 +72,8 @@ fn closed_lids_before_sockets_are_no_fused_lids() {
         }
     }
     let face = template.skin.with_positions(positions).expect("finite");
-    let [mouth, left, right] = states(&run(&face).report);
-    assert_eq!(mouth, OpeningState::Open);
-    for eye in [left, right] {
-        assert_ne!(eye, OpeningState::Fused);
+    let report = run(&face).report;
+    for state in states(&report) {
+        assert_ne!(state, OpeningState::Fused, "{:?}", report.openings);
     }
 }

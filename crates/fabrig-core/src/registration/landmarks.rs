@@ -172,7 +172,7 @@ pub fn parse_landmarks(
                 });
             }
             if named.is_empty() {
-                return Err(not_landmarks("it is empty".to_owned()));
+                return Err(not_landmarks("there are no landmarks in it".to_owned()));
             }
             return Ok(named
                 .into_iter()
