@@ -413,8 +413,11 @@ fn wrinkles() -> CaseResult {
     let pose = contracted(&patch, 0.25, 0.0);
     let depths: Vec<f64> = (0..6)
         .map(|seed| {
+            // The imperfection varies what rest lengths take from the target, so they must take
+            // something.
             let options = ClothOptions {
-                rest_blend: 0.0,
+                rest_blend: 0.2,
+                rest_imperfection: 0.5,
                 seed,
                 ..default()
             };
@@ -427,7 +430,8 @@ fn wrinkles() -> CaseResult {
     let least = depths.iter().copied().fold(f64::INFINITY, f64::min);
     CaseResult::new(
         "22 the depth of wrinkles is much the same for six seeds",
-        most / least,
+        // Seeds that all give one depth are not seeds.
+        if most > least { most / least } else { f64::INFINITY },
         1.25,
         "deepest over shallowest",
     )
