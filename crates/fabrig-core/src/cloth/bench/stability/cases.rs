@@ -431,7 +431,11 @@ fn wrinkles() -> CaseResult {
     CaseResult::new(
         "22 the depth of wrinkles is much the same for six seeds",
         // Seeds that all give one depth are not seeds.
-        if most > least { most / least } else { f64::INFINITY },
+        if most > least {
+            most / least
+        } else {
+            f64::INFINITY
+        },
         1.25,
         "deepest over shallowest",
     )
