@@ -3,10 +3,9 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::constraints::attachment::Port;
-use super::group::{PatchGroup, Substep};
+use super::assembly::PatchLayout;
+use super::group::{PatchGroup, Ports, Substep};
 use super::hook::{HookSubstep, SubstepHook};
-use super::solver::PatchLayout;
 
 /// Where the nodes that a hook sees come from.
 pub(super) struct SeenNodes {
@@ -44,7 +43,7 @@ impl SeenNodes {
 /// Runs all substeps of a frame, with `hook` moving nodes in each.
 pub(super) fn advance_hooked(
     groups: &mut [Box<dyn PatchGroup>],
-    ports: &mut [Vec<Vec<Port>>; 2],
+    ports: &mut [Vec<Ports>; 2],
     substeps: &[Substep],
     layout: &[PatchLayout],
     hook: &mut dyn SubstepHook,
@@ -66,7 +65,7 @@ pub(super) fn advance_hooked(
             g.predict(first, p);
         });
     for (k, substep) in substeps.iter().enumerate() {
-        let shared: &[Vec<Port>] = now;
+        let shared: &[Ports] = now;
         groups.par_iter_mut().for_each(|g| {
             g.solve(substep, shared);
             g.hold_back();

@@ -33,11 +33,11 @@ pub(crate) trait Real:
     /// The same value in every lane.
     fn splat(value: f64) -> Self;
 
-    /// The value that a function gives for each lane.
-    fn from_lanes(value: impl Fn(usize) -> f32) -> Self;
+    /// Replaces the value of one lane by one in single precision.
+    fn load_lane(&mut self, lane: usize, value: f32);
 
-    /// Value of one lane.
-    fn lane(self, lane: usize) -> f64;
+    /// Value of one lane. By reference: a register would go through memory to be indexed.
+    fn lane(&self, lane: usize) -> f64;
 
     /// Replaces the value of one lane.
     fn set_lane(&mut self, lane: usize, value: f64);
@@ -66,13 +66,13 @@ macro_rules! scalar_real {
             }
 
             #[inline(always)]
-            fn from_lanes(value: impl Fn(usize) -> f32) -> Self {
-                <$scalar>::from(value(0))
+            fn load_lane(&mut self, _lane: usize, value: f32) {
+                *self = <$scalar>::from(value);
             }
 
             #[inline(always)]
-            fn lane(self, _lane: usize) -> f64 {
-                f64::from(self)
+            fn lane(&self, _lane: usize) -> f64 {
+                f64::from(*self)
             }
 
             #[inline(always)]
@@ -156,16 +156,12 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
-            fn from_lanes(value: impl Fn(usize) -> f32) -> Self {
-                let mut out = [0.0; $count];
-                for lane in 0..$count {
-                    out[lane] = <$scalar>::from(value(lane));
-                }
-                Self(out)
+            fn load_lane(&mut self, lane: usize, value: f32) {
+                self.0[lane] = <$scalar>::from(value);
             }
 
             #[inline(always)]
-            fn lane(self, lane: usize) -> f64 {
+            fn lane(&self, lane: usize) -> f64 {
                 f64::from(self.0[lane])
             }
 
@@ -285,7 +281,7 @@ impl<R: Real> Vec3<R> {
 
     /// Value of one lane.
     #[inline(always)]
-    pub(crate) fn lane(self, lane: usize) -> [f64; 3] {
+    pub(crate) fn lane(&self, lane: usize) -> [f64; 3] {
         [self.x.lane(lane), self.y.lane(lane), self.z.lane(lane)]
     }
 

@@ -43,8 +43,9 @@
 //! Around that stand a robust mode (vertex block descent in which the energy of a step never
 //! rises) and, as a baseline, position-based dynamics as in the paper's Algorithm 1; see
 //! [`Mode`]. Guards watch every patch: displacements are clamped to half an edge per substep,
-//! a patch whose energy rises beyond what was put in falls back to backward Euler, then to the
-//! robust mode, and in the end is put back to its target. All are counted in [`Counters`].
+//! a patch whose energy rises beyond what was put in, or stays where damping must have taken it,
+//! falls back to backward Euler, then to the robust mode, and in the end is put back to its
+//! target. All are counted in [`Counters`].
 //!
 //! The state is the displacement u = x - X from the target, in single precision; while edges
 //! are projected, positions are relative to the patch's centre. Forces and constraints are in
@@ -62,10 +63,12 @@
 //! Macklin, Müller & Chentanez 2016, *XPBD*; Macklin et al. 2019, *Small steps in physics
 //! simulation*; the BDF2 form and the folding of diagonal terms are fabrig's.
 
+mod assembly;
 pub mod bench;
 mod constraints;
 mod error;
 mod group;
+mod guard;
 mod hook;
 mod hooked;
 mod input;

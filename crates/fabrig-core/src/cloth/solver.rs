@@ -1,19 +1,15 @@
 //! The cloth: patches grouped into lanes, frames cut into substeps, guards.
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::constraints::attachment::Port;
+use super::assembly::{Assembly, PatchLayout, assemble};
 use super::error::ClothError;
-use super::group::{Group, GroupPairs, Monitor, Partner, PatchGroup, Substep};
+use super::group::{Monitor, PatchGroup, Ports, Substep};
+use super::guard::Guard;
 use super::hook::SubstepHook;
 use super::hooked::{SeenNodes, advance_hooked};
-use super::input::{
-    ClothAttachment, ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion, Precision,
-};
-use super::lanes::{F32x8, F64x8};
+use super::input::{ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion};
 use super::report::{Counters, Energies, StepReport};
 use super::validate;
 
@@ -23,48 +19,19 @@ const LONGEST_FRAME: u32 = 8;
 /// Substeps that share an evaluation of the wind, which changes more slowly than they do.
 const WIND_SUBSTEPS: u32 = 8;
 
-/// Energy may exceed the bound by this factor before a patch falls back.
-const ENERGY_TOLERANCE: f64 = 4.0;
-
-/// Energy may exceed the bound by this factor before a patch is frozen.
-const FREEZE_TOLERANCE: f64 = 1e3;
-
-/// A patch that has fallen back in this many frames on end is solved by descent as well.
-const LONGEST_EULER: u32 = 3;
-
-/// A patch that has fallen back in this many frames on end is frozen.
-const LONGEST_TROUBLE: u32 = 30;
-
-/// Frames of backward Euler after a fall-back, and of descent after a fall-back to that.
-const EULER_FRAMES: u32 = 2;
-const ROBUST_FRAMES: u32 = 30;
-
 /// A cloth of patches, drawn to moving targets. See the [module](super) for the method.
 pub struct Cloth {
     options: ClothOptions,
     layout: Vec<PatchLayout>,
     groups: Vec<Box<dyn PatchGroup>>,
     /// Ports of each group, and those of the next substep.
-    ports: [Vec<Vec<Port>>; 2],
+    ports: [Vec<Ports>; 2],
     has_pairs: bool,
     monitors: Vec<Vec<Monitor>>,
+    guard: Guard,
     positions: Vec<Vec<Point3<f32>>>,
-    energies: Vec<Energies>,
-    /// Energy that each patch may have, and at the end the whole, from what was put in so far.
-    ceilings: Vec<f64>,
-    /// For how many frames on end each patch has fallen back.
-    troubled_frames: Vec<u32>,
     previous_h: f64,
     fields: Fields,
-}
-
-/// Where a patch is, and what its input must look like.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PatchLayout {
-    pub(crate) node_count: usize,
-    pub(crate) anchor_count: usize,
-    pub(super) group: usize,
-    pub(super) lane: usize,
 }
 
 /// Gravity's difference, wind and head motion at the end of a frame.
@@ -123,31 +90,16 @@ impl Cloth {
     pub fn new(patches: &[ClothPatch], options: &ClothOptions) -> Result<Self, ClothError> {
         validate::options(options)?;
         validate::patches(patches)?;
-        let mut groups: Vec<Box<dyn PatchGroup>> = Vec::new();
-        let mut layout: Vec<PatchLayout> = patches
-            .iter()
-            .map(|p| PatchLayout {
-                node_count: p.shape.node_count(),
-                anchor_count: p.anchor_sets().map(|(nodes, _)| nodes.len()).sum(),
-                group: 0,
-                lane: 0,
-            })
-            .collect();
-        for members in plan_groups(patches, options.precision) {
-            for (lane, &patch) in members.iter().enumerate() {
-                layout[patch].group = groups.len();
-                layout[patch].lane = lane;
-            }
-            groups.push(make_group(patches, &members, options));
-        }
-        let has_pairs = link_pairs(patches, &layout, &mut groups);
-        let empty_ports = vec![Vec::new(); groups.len()];
+        let Assembly {
+            groups,
+            layout,
+            has_pairs,
+        } = assemble(patches, options);
+        let empty_ports = vec![Ports::default(); groups.len()];
         Ok(Self {
             options: *options,
             positions: patches.iter().map(|p| p.rest.clone()).collect(),
-            energies: vec![Energies::default(); patches.len()],
-            ceilings: vec![0.0; patches.len() + 1],
-            troubled_frames: vec![0; patches.len()],
+            guard: Guard::new(patches.len(), has_pairs),
             monitors: vec![Vec::new(); groups.len()],
             ports: [empty_ports.clone(), empty_ports],
             has_pairs,
@@ -220,9 +172,7 @@ impl Cloth {
         }
         self.fields = Fields::NONE;
         self.previous_h = 0.0;
-        self.energies.fill(Energies::default());
-        self.ceilings.fill(0.0);
-        self.troubled_frames.fill(0);
+        self.guard.reset();
     }
 
     /// Moves the cloth through one frame.
@@ -294,7 +244,7 @@ impl Cloth {
                 .zip(monitors)
                 .for_each(|(group, monitor)| {
                     group.begin_frame(dt, targets, anchors);
-                    let mut none = Vec::new();
+                    let mut none = Ports::default();
                     for (k, substep) in substeps.iter().enumerate() {
                         if k == 0 {
                             group.predict(substep, &mut none);
@@ -309,7 +259,7 @@ impl Cloth {
         }
         self.fields = end;
         self.previous_h = input.dt / f64::from(count);
-        let (counters, energies) = self.guard();
+        let (counters, energies) = self.guard.watch(input.dt, &mut self.groups, &self.monitors);
         self.write_positions();
         Ok(StepReport {
             substeps: count,
@@ -333,7 +283,7 @@ impl Cloth {
     ///
     /// If there is no such patch.
     pub fn patch_energies(&self, patch: usize) -> &Energies {
-        &self.energies[patch]
+        &self.guard.energies[patch]
     }
 
     /// Position (mm) and velocity (mm/s) of one node in the precision of the solver.
@@ -374,62 +324,6 @@ impl Cloth {
         }
     }
 
-    /// Looks at every patch after a frame, and acts where one has gone wrong.
-    fn guard(&mut self) -> (Counters, Energies) {
-        let mut counters = Counters::default();
-        let mut sum = Energies::default();
-        // Pairs hand energy from patch to patch; then only the whole is bounded.
-        let mut whole = Monitor::default();
-        let mut whole_energy = 0.0;
-        for m in self.monitors.iter().flatten() {
-            whole.before += m.before;
-            whole.drive += m.drive;
-            whole.mismatch += m.mismatch;
-            whole_energy += m.energies.total();
-        }
-        let last = self.ceilings.len() - 1;
-        let whole_bound = energy_bound(&whole, whole_energy, &mut self.ceilings[last]);
-        for (group, monitors) in self.groups.iter_mut().zip(&self.monitors) {
-            for (lane, m) in monitors.iter().enumerate() {
-                let patch = group.patches()[lane];
-                counters.clamped_displacements += m.clamped;
-                let energy = m.energies.total();
-                let own_bound = energy_bound(m, energy, &mut self.ceilings[patch]);
-                let bound = if self.has_pairs {
-                    whole_bound
-                } else {
-                    own_bound
-                };
-                self.energies[patch] = m.energies;
-                let trouble = &mut self.troubled_frames[patch];
-                *trouble = if energy > ENERGY_TOLERANCE * bound {
-                    *trouble + 1
-                } else {
-                    0
-                };
-                let is_lost = energy > FREEZE_TOLERANCE * bound || *trouble > LONGEST_TROUBLE;
-                if !m.is_sound || is_lost {
-                    group.freeze(lane);
-                    counters.frozen_patches += 1;
-                    self.energies[patch] = Energies::default();
-                    self.ceilings[patch] = 0.0;
-                    *trouble = 0;
-                } else if *trouble > LONGEST_EULER {
-                    group.fall_back(lane, ROBUST_FRAMES, true);
-                    counters.robust_fallbacks += 1;
-                } else if *trouble > 0 {
-                    group.fall_back(lane, EULER_FRAMES, false);
-                    counters.euler_fallbacks += 1;
-                }
-                sum += self.energies[patch];
-            }
-        }
-        if !self.ceilings[last].is_finite() {
-            self.ceilings[last] = sum.total();
-        }
-        (counters, sum)
-    }
-
     fn write_positions(&mut self) {
         let (layout, groups) = (&self.layout, &self.groups);
         self.positions
@@ -439,22 +333,10 @@ impl Cloth {
     }
 }
 
-/// What energy a patch may have after a frame: what it had, or might have had, and what moving
-/// targets and fields gave, as amplitudes, with what rest lengths and anchors hold against the
-/// targets. Without input the ceiling never rises, however slowly energy creeps up. The floor
-/// is the energy of a thousandth of a millimetre at 10 Hz in a thousand nodes.
-fn energy_bound(m: &Monitor, energy: f64, ceiling: &mut f64) -> f64 {
-    let before = ceiling.min(ENERGY_TOLERANCE * m.before).max(0.0);
-    let amplitude = before.sqrt() + m.drive;
-    let bound = amplitude * amplitude + 2.0 * m.mismatch + 1.0;
-    *ceiling = energy.min(bound).max(amplitude * amplitude);
-    bound
-}
-
 /// Runs all substeps with the groups in step, as pairs couple them.
 fn advance_together(
     groups: &mut [Box<dyn PatchGroup>],
-    ports: &mut [Vec<Vec<Port>>; 2],
+    ports: &mut [Vec<Ports>; 2],
     substeps: &[Substep],
 ) {
     let [now, next] = ports;
@@ -467,7 +349,7 @@ fn advance_together(
         .for_each(|(g, p)| g.predict(first, p));
     for (k, substep) in substeps.iter().enumerate() {
         let following = substeps.get(k + 1);
-        let shared: &[Vec<Port>] = now;
+        let shared: &[Ports] = now;
         groups
             .par_iter_mut()
             .zip(next.par_iter_mut())
@@ -480,98 +362,4 @@ fn advance_together(
             });
         std::mem::swap(now, next);
     }
-}
-
-/// Patches of one shape, with or without pressure, in chunks of at most eight.
-fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> {
-    let widest = match precision {
-        Precision::Single | Precision::Double => 8,
-        Precision::SingleScalar => 1,
-    };
-    let mut alike: BTreeMap<(u32, u32, bool, bool), Vec<usize>> = BTreeMap::new();
-    for (index, p) in patches.iter().enumerate() {
-        let key = (
-            p.shape.u_count,
-            p.shape.v_count,
-            p.shape.is_periodic,
-            p.material.pressure > 0.0,
-        );
-        alike.entry(key).or_default().push(index);
-    }
-    alike
-        .into_values()
-        .flat_map(|members| {
-            members
-                .chunks(widest)
-                .map(<[usize]>::to_vec)
-                .collect::<Vec<_>>()
-        })
-        .collect()
-}
-
-fn make_group(
-    patches: &[ClothPatch],
-    members: &[usize],
-    options: &ClothOptions,
-) -> Box<dyn PatchGroup> {
-    match options.precision {
-        Precision::Double => Box::new(Group::<F64x8>::new(patches, members, options)),
-        Precision::SingleScalar => Box::new(Group::<f32>::new(patches, members, options)),
-        Precision::Single => Box::new(Group::<F32x8>::new(patches, members, options)),
-    }
-}
-
-/// Gives every group the pairs of its nodes. Returns whether there are any.
-fn link_pairs(
-    patches: &[ClothPatch],
-    layout: &[PatchLayout],
-    groups: &mut [Box<dyn PatchGroup>],
-) -> bool {
-    let mut lists = vec![GroupPairs::default(); groups.len()];
-    let mut ports: BTreeMap<(usize, u32), usize> = BTreeMap::new();
-    let mut port_of = |lists: &mut [GroupPairs], patch: usize, node: u32| {
-        let at = &layout[patch];
-        *ports.entry((patch, node)).or_insert_with(|| {
-            let list = &mut lists[at.group];
-            list.nodes.push((node, at.lane as u32));
-            list.partners.push(Vec::new());
-            list.nodes.len() - 1
-        })
-    };
-    let mut has_pairs = false;
-    for (a, patch) in patches.iter().enumerate() {
-        for attachment in &patch.attachments {
-            let ClothAttachment::Patch {
-                patch: b,
-                pairs,
-                strength,
-            } = attachment
-            else {
-                continue;
-            };
-            let b = *b as usize;
-            let stiffness = |p: usize| patches[p].material.stretch_stiffness();
-            let stiffness = strength * stiffness(a).min(stiffness(b));
-            for &(node, other) in pairs {
-                has_pairs = true;
-                let (ga, gb) = (layout[a].group, layout[b].group);
-                let pa = port_of(&mut lists, a, node);
-                let pb = port_of(&mut lists, b, other);
-                lists[ga].partners[pa].push(Partner {
-                    group: gb,
-                    port: pb,
-                    stiffness,
-                });
-                lists[gb].partners[pb].push(Partner {
-                    group: ga,
-                    port: pa,
-                    stiffness,
-                });
-            }
-        }
-    }
-    for (group, list) in groups.iter_mut().zip(lists) {
-        group.set_pairs(list);
-    }
-    has_pairs
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::assembly::PatchLayout;
 use super::error::ClothError;
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, FrameInput, PatchMotion};
-use super::solver::PatchLayout;
 
 /// Largest coordinate. (mm)
 const FARTHEST: f32 = 1e6;

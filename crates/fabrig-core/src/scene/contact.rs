@@ -62,7 +62,7 @@ impl FaceContact {
                         .collect(),
                     is_ring,
                     is_mouth: is_ring && chart.side == Side::Mid,
-                    node_mass: scene.cloth.areal_density * cloth.material.mass * area(cloth)
+                    node_mass: scene.cloth.areal_density * cloth.material.mass * cloth.area()
                         / cloth.rest.len() as f64,
                     bodies: match (is_ring, chart.side) {
                         (true, Side::Left) => vec![0],
@@ -163,15 +163,4 @@ impl FaceContact {
             .collect();
         self.contact.judge(positions, &colliders)
     }
-}
-
-/// Area of a patch at rest. [mm^2]
-fn area(patch: &ClothPatch) -> f64 {
-    let at = |i: u32| patch.rest[i as usize].map(f64::from);
-    patch
-        .shape
-        .quads()
-        .iter()
-        .map(|&[a, b, c, d]| (at(c) - at(a)).cross(&(at(d) - at(b))).norm() / 2.0)
-        .sum()
 }

@@ -11,8 +11,7 @@ use crate::cloth::constraints::bend::{BendCompliance, project_bend};
 use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{RestLengths, StretchCompliance, project_stretch};
-use crate::cloth::group::Widest;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::cloth::lanes::{F32x8, Real, Vec3};
 
 /// Sweeps in one timing.
 const SWEEPS: usize = 64;
@@ -47,7 +46,8 @@ pub fn constraint_count(patch: &ClothPatch) -> usize {
 
 /// Measures the floor of a scene on a group of the default patch size, 21 x 20.
 pub fn floor(scene: &BenchScene) -> Floor {
-    let mut kernel = BareGroup::<Widest>::new();
+    type Lanes = F32x8;
+    let mut kernel = BareGroup::<Lanes>::new();
     let count =
         kernel.lists.edges.len() + kernel.lists.diagonals.len() + kernel.lists.triples.len();
     let mut least = f64::INFINITY;
@@ -56,11 +56,11 @@ pub fn floor(scene: &BenchScene) -> Floor {
         crate::cloth::group::vectorized(Sweeps(&mut kernel));
         least = least.min(clock.elapsed().as_secs_f64());
     }
-    let projections = (SWEEPS * count * Widest::LANES) as f64;
+    let projections = (SWEEPS * count * Lanes::LANES) as f64;
     Floor {
         constraint_count: scene.patches.iter().map(constraint_count).sum(),
         ns_per_constraint: least * 1e9 / projections,
-        lane_count: Widest::LANES,
+        lane_count: Lanes::LANES,
     }
 }
 
@@ -138,7 +138,7 @@ impl<R: Real> pulp::NullaryFnOnce for Sweeps<'_, R> {
                 half,
                 half,
             );
-            project_stretch(
+            project_stretch::<R, true>(
                 &g.lists.edges,
                 &mut g.positions,
                 &g.inv_masses,

@@ -9,7 +9,7 @@ mod floor;
 mod measure;
 mod pareto;
 mod scene;
-mod stability;
+pub(crate) mod stability;
 mod synthetic;
 
 pub use floor::{Floor, constraint_count, floor};

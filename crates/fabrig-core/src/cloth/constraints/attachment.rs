@@ -8,7 +8,7 @@
 //! the offset is kept that their targets have now, so a held pose is not disturbed and the
 //! offset turns with the jaw. All pairs are projected at once from the predicted positions
 //! (Jacobi). A node of n pairs gives each of them an n-th of its mass, which keeps soft pairs
-//! exact and rigid ones stable. Corrections are added in fixed point, where addition is
+//! exact and rigid ones stable. Corrections are rounded to a fixed grid, on which addition is
 //! associative, so they depend neither on the order of the pairs nor on threads, and mirrored
 //! input gives mirrored output.
 //!
@@ -16,70 +16,74 @@
 //! Benevolenski & Voroshilov 2012, *Mass splitting for jitter-free parallel rigid body
 //! simulation*.
 
-/// Fixed-point units per mm; a correction is exact to 2^-36 mm.
-const UNITS_PER_MM: f64 = (1_u64 << 36) as f64;
+use crate::cloth::lanes::{Real, Vec3};
 
-/// Corrections are kept within this, so that a sum of 2^15 of them cannot overflow. (mm)
-const LARGEST: f64 = 4096.0;
+/// Differences of displacements are kept within this. (mm)
+const LARGEST: f64 = 65_536.0;
 
-/// Where a node of a pair stands before pairs are projected.
+/// Added and subtracted again, it rounds a number to a multiple of 2^-34 mm. Such numbers, and
+/// their sums up to 2^18 mm, are exact.
+const ROUNDING: f64 = 1.5 * (1_u64 << 18) as f64;
+
+/// What a node brings into its pairs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Port {
-    /// Predicted displacement from the target. (mm)
-    pub(crate) displacement: [f64; 3],
+pub(crate) struct PairEnd {
     /// Effective inverse mass. [1/mass]
     pub(crate) inv_mass: f64,
     /// How many pairs share the node.
     pub(crate) pair_count: f64,
 }
 
-/// Correction of node a by its pair with b. (mm)
+/// Share of the way to b's displacement that a goes in the projection of their pair.
 ///
 /// - `compliance`: 1/(k h_e^2) [1/mass]
 #[inline(always)]
-pub(crate) fn project_pair(a: &Port, b: &Port, compliance: f64) -> [f64; 3] {
-    let share = a.inv_mass / (a.inv_mass * a.pair_count + b.inv_mass * b.pair_count + compliance);
-    [0, 1, 2].map(|axis| (b.displacement[axis] - a.displacement[axis]) * share)
+pub(crate) fn pair_share(a: &PairEnd, b: &PairEnd, compliance: f64) -> f64 {
+    a.inv_mass / (a.inv_mass * a.pair_count + b.inv_mass * b.pair_count + compliance)
 }
 
 /// A sum of corrections that does not depend on their order.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct OrderFreeSum {
-    sum: [i64; 3],
+    sum: [f64; 3],
 }
 
 impl OrderFreeSum {
-    /// Takes in one correction. (mm)
+    /// Takes in the correction of `own` by its pair with `other`, which goes `share` of the
+    /// way. (mm)
     #[inline(always)]
-    pub(crate) fn add(&mut self, correction: [f64; 3]) {
+    pub(crate) fn add(&mut self, own: [f64; 3], other: [f64; 3], share: f64) {
         for axis in 0..3 {
-            let bounded = correction[axis].clamp(-LARGEST, LARGEST);
-            // Truncation towards zero treats both signs alike.
-            self.sum[axis] += (bounded * UNITS_PER_MM) as i64;
+            let gap = other[axis] - own[axis];
+            // What is no number counts as far away.
+            let gap = if -LARGEST < gap { gap } else { -LARGEST };
+            let gap = if gap < LARGEST { gap } else { LARGEST };
+            // The nearest multiple: both signs are treated alike.
+            self.sum[axis] += (gap * share + ROUNDING) - ROUNDING;
         }
     }
 
     /// The sum. (mm)
     #[inline(always)]
     pub(crate) fn total(&self) -> [f64; 3] {
-        self.sum.map(|s| s as f64 / UNITS_PER_MM)
+        self.sum
     }
 }
 
-/// Pull and added mass of an anchor: `(k h_e^2 (A - X), k h_e^2)`. [mm mass, mass]
+/// Pull of an anchor, `k h_e^2 (A - X)`; it adds `k h_e^2` to the mass. [mm mass]
+///
+/// - `offset`: A - X (mm)
 #[inline(always)]
-pub(crate) fn anchor_pull(offset: [f64; 3], stiffness: f64, h_e: f64) -> ([f64; 3], f64) {
-    let added = stiffness * h_e * h_e;
-    (offset.map(|o| o * added), added)
+pub(crate) fn anchor_pull<R: Real>(offset: Vec3<R>, stiffness: R, h_e: R) -> Vec3<R> {
+    offset * (stiffness * h_e * h_e)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn port(displacement: [f64; 3], inv_mass: f64) -> Port {
-        Port {
-            displacement,
+    fn end(inv_mass: f64) -> PairEnd {
+        PairEnd {
             inv_mass,
             pair_count: 1.0,
         }
@@ -87,26 +91,20 @@ mod tests {
 
     #[test]
     fn a_rigid_pair_meets_and_keeps_momentum() {
-        let a = port([1.0, 2.0, 3.0], 0.5);
-        let b = port([0.0, -1.0, 3.5], 2.0);
-        let da = project_pair(&a, &b, 0.0);
-        let db = project_pair(&b, &a, 0.0);
-        for axis in 0..3 {
-            let gap = a.displacement[axis] + da[axis] - b.displacement[axis] - db[axis];
-            assert!(gap.abs() < 1e-14);
-            assert!((da[axis] / 0.5 + db[axis] / 2.0).abs() < 1e-14);
-        }
+        let (a, b) = (end(0.5), end(2.0));
+        let (of_a, of_b) = (pair_share(&a, &b, 0.0), pair_share(&b, &a, 0.0));
+        assert!((of_a + of_b - 1.0).abs() < 1e-14, "they meet");
+        assert!((of_a / 0.5 - of_b / 2.0).abs() < 1e-14, "equal impulses");
     }
 
     #[test]
     fn compliance_limits_the_force() {
-        let a = port([1.0, 0.0, 0.0], 1.0);
-        let b = port([0.0; 3], 1.0);
-        // Implicit step of a spring k = 4, h_e = 1, between unit masses.
-        let moved = project_pair(&a, &b, 0.25)[0];
+        let (a, b) = (end(1.0), end(1.0));
+        // Implicit step of a spring k = 4, h_e = 1, between unit masses at a distance of -1.
+        let moved = -pair_share(&a, &b, 0.25);
         let force = -4.0 * (1.0 + 2.0 * moved);
         assert!((moved - force).abs() < 1e-14);
-        assert_eq!(project_pair(&a, &b, f64::INFINITY)[0], 0.0);
+        assert_eq!(pair_share(&a, &b, f64::INFINITY), 0.0);
     }
 
     #[test]
@@ -115,7 +113,8 @@ mod tests {
         let sum = |order: [usize; 3], sign: f64| {
             let mut m = OrderFreeSum::default();
             for i in order {
-                m.add([terms[i][0] * sign, terms[i][1], terms[i][2]]);
+                let own = [0.01 * sign, 0.02, 0.03];
+                m.add(own, [terms[i][0] * sign, terms[i][1], terms[i][2]], 0.3);
             }
             m.total()
         };
@@ -123,16 +122,16 @@ mod tests {
         assert_eq!(one, sum([2, 0, 1], 1.0));
         let mirrored = sum([1, 2, 0], -1.0);
         assert_eq!(one[0], -mirrored[0]);
-        assert!((one[0] - 0.5).abs() < 1e-9);
-        assert!((one[1] + LARGEST).abs() < 1.0, "bounded");
+        assert!((one[0] - 0.3 * (0.5 - 0.03)).abs() < 1e-9);
+        assert!((one[1] + 0.3 * LARGEST).abs() < 1.0, "bounded");
     }
 
     #[test]
     fn an_anchor_is_the_implicit_step_of_its_spring() {
         // m x'' = -k (x - A): (x - y) m = -h^2 k (x - A), relative to X = 0.
-        let (pull, added) = anchor_pull([2.0, 0.0, 0.0], 50.0, 0.1);
+        let pull = anchor_pull(Vec3::<f64>::splat([2.0, 0.0, 0.0]), 50.0, 0.1);
         let (m, y) = (1.5, -1.0);
-        let x = (m * y + pull[0]) / (m + added);
+        let x = (m * y + pull.x) / (m + 50.0 * 0.01);
         assert!((m * (x - y) + 0.01 * 50.0 * (x - 2.0)).abs() < 1e-14);
     }
 }

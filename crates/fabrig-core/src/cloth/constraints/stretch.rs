@@ -131,8 +131,10 @@ pub(crate) fn project_edge<R: Real>(
 ///
 /// - `positions`, `resting` (mm), `inv_masses` [1/mass]: one per node; see [`project_edge`]
 /// - `progress`: how far through the frame, 0 to 1
+///
+/// Without `IS_DAMPED` the compliance's damping counts as zero, and `resting` is not read.
 #[inline(always)]
-pub(crate) fn project_stretch<R: Real>(
+pub(crate) fn project_stretch<R: Real, const IS_DAMPED: bool>(
     edges: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
@@ -141,6 +143,14 @@ pub(crate) fn project_stretch<R: Real>(
     progress: R,
     compliance: &StretchCompliance<R>,
 ) {
+    let compliance = if IS_DAMPED {
+        *compliance
+    } else {
+        StretchCompliance {
+            gamma: R::splat(0.0),
+            ..*compliance
+        }
+    };
     for (edge, &[i, j]) in edges.iter().enumerate() {
         let (i, j) = (i as usize, j as usize);
         let (a, b) = project_edge(
@@ -149,8 +159,12 @@ pub(crate) fn project_stretch<R: Real>(
             inv_masses[i],
             inv_masses[j],
             rest.at(edge, progress),
-            resting[i] - resting[j],
-            compliance,
+            if IS_DAMPED {
+                resting[i] - resting[j]
+            } else {
+                Vec3::zero()
+            },
+            &compliance,
         );
         positions[i] += a;
         positions[j] += b;

@@ -3,11 +3,12 @@
 use nalgebra::Point3;
 
 use super::descent::merge;
-use super::interface::{GroupPairs, Monitor, PatchGroup, Substep};
+use super::instructions::vectorized;
+use super::interface::{GroupPairs, Monitor, PatchGroup, Ports, Substep};
+use super::pairs::PairTable;
 use super::state::{FARTHEST, Group};
-use crate::cloth::constraints::attachment::Port;
 use crate::cloth::input::{Mode, PatchMotion};
-use crate::cloth::lanes::{F32x8, Real};
+use crate::cloth::lanes::Real;
 use crate::cloth::report::Energies;
 
 impl<R: Real> PatchGroup for Group<R> {
@@ -15,8 +16,8 @@ impl<R: Real> PatchGroup for Group<R> {
         &self.patches
     }
 
-    fn set_pairs(&mut self, pairs: GroupPairs) {
-        self.pairs = pairs;
+    fn set_pairs(&mut self, group: usize, pairs: GroupPairs) {
+        self.pairs = PairTable::new(group, &pairs);
     }
 
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
@@ -62,22 +63,23 @@ impl<R: Real> PatchGroup for Group<R> {
         vectorized(BeginFrame(self, dt));
     }
 
-    fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>) {
+    fn predict(&mut self, substep: &Substep, ports: &mut Ports) {
         vectorized(Predict(self, substep));
         self.write_ports(ports);
     }
 
-    fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]) {
+    fn solve(&mut self, substep: &Substep, ports: &[Ports]) {
         self.solve_pairs(ports);
         let sweeps = self.sweeps;
-        let is_robust: Vec<bool> = self
-            .lane_states
-            .iter()
-            .map(|s| s.robust_frames > 0)
-            .collect();
-        if self.mode == Mode::Robust || is_robust.iter().all(|&r| r) {
+        let robust_count = (self.lane_states.iter())
+            .filter(|s| s.robust_frames > 0)
+            .count();
+        if self.mode == Mode::Robust || robust_count == R::LANES {
             vectorized(Descend(self, (substep, sweeps)));
-        } else if is_robust.contains(&true) {
+        } else if robust_count > 0 {
+            let is_robust: Vec<bool> = (self.lane_states.iter())
+                .map(|s| s.robust_frames > 0)
+                .collect();
             let start = self.solution.clone();
             vectorized(Descend(self, (substep, sweeps)));
             let robust = std::mem::replace(&mut self.solution, start);
@@ -138,20 +140,19 @@ impl<R: Real> PatchGroup for Group<R> {
         vectorized(Finish(self));
     }
 
-    fn turn(&mut self, following: &Substep, ports: &mut Vec<Port>) {
+    fn turn(&mut self, following: &Substep, ports: &mut Ports) {
         vectorized(Turn(self, following));
         self.write_ports(ports);
     }
 
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>) {
         let sums = vectorized(EnergyOf(self));
-        let anchors = self.anchor_energies();
         monitors.clear();
         for lane in 0..self.patches.len() {
             let energies = Energies {
                 kinetic: sums[0].lane(lane),
                 magnet: sums[1].lane(lane),
-                anchors: anchors[lane][0],
+                anchors: sums[7].lane(lane),
                 stretch: sums[2].lane(lane),
                 compression: sums[3].lane(lane),
                 shear: sums[4].lane(lane),
@@ -160,12 +161,13 @@ impl<R: Real> PatchGroup for Group<R> {
             };
             let squared = self.squared_distance.lane(lane);
             let state = &mut self.lane_states[lane];
-            let mismatch = self.mismatch.lane(lane) + anchors[lane][1];
+            let mismatch = self.mismatch.lane(lane) + sums[8].lane(lane);
             monitors.push(Monitor {
                 energies,
                 before: state.energy,
                 drive: self.drive.lane(lane),
                 mismatch: mismatch + state.mismatch,
+                damping: self.damping.lane(lane) + self.magnet.damping.lane(lane),
                 clamped: self.clamped.lane(lane) as u64,
                 is_sound: energies.total().is_finite() && squared < FARTHEST * FARTHEST,
             });
@@ -221,16 +223,6 @@ impl<R: Real> Group<R> {
     }
 }
 
-/// The widest lanes that patches are put into.
-pub(crate) type Widest = F32x8;
-
-/// Runs `work` compiled for the widest vector instructions that this processor has.
-///
-/// A closure would not do: it is compiled for the baseline unless it happens to be inlined.
-pub(crate) fn vectorized<W: pulp::NullaryFnOnce>(work: W) -> W::Output {
-    pulp::Arch::new().dispatch(work)
-}
-
 macro_rules! vectorized_work {
     ($name:ident<$($field:ty),*> -> $output:ty, |$group:ident, $($argument:ident)?| $body:expr) => {
         struct $name<'a, R>(&'a mut Group<R>, $($field),*);
@@ -269,4 +261,4 @@ vectorized_work!(
 vectorized_work!(HoldBack<> -> (), |group, | group.hold_back_lanes());
 vectorized_work!(Finish<> -> (), |group, | group.finish_lanes());
 vectorized_work!(Turn<&'a Substep> -> (), |group, substep| group.turn_lanes(substep));
-vectorized_work!(EnergyOf<> -> [R; 7], |group, | group.energy_lanes());
+vectorized_work!(EnergyOf<> -> [R; 9], |group, | group.energy_lanes());

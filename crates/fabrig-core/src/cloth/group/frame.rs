@@ -1,6 +1,6 @@
 //! The ends of a frame: targets and anchors in, energies out.
 
-use super::state::{Group, relative};
+use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, bend_energy};
 use crate::cloth::constraints::pressure::swept_volume;
 use crate::cloth::constraints::shear::shear_energy;
@@ -20,28 +20,32 @@ impl<R: Real> Group<R> {
         let motions: Vec<&PatchMotion> = (0..R::LANES)
             .map(|lane| &targets[self.patch_of(lane)])
             .collect();
-        for i in 0..self.ends.len() {
-            let at = |axis: usize| R::from_lanes(|lane| motions[lane].positions[i][axis]);
-            self.ends[i] = Vec3::new(at(0), at(1), at(2)) - self.origin;
+        for (lane, motion) in motions.iter().enumerate() {
+            for (end, p) in self.ends.iter_mut().zip(&motion.positions) {
+                end.x.load_lane(lane, p.x);
+                end.y.load_lane(lane, p.y);
+                end.z.load_lane(lane, p.z);
+            }
+        }
+        for end in &mut self.ends {
+            *end -= self.origin;
         }
         let has_velocity = |lane: usize| !motions[lane].velocities.is_empty();
-        if (0..R::LANES).all(has_velocity) {
-            let dt = R::splat(dt);
-            for (i, slope) in self.end_slopes.iter_mut().enumerate() {
-                let at = |axis: usize| R::from_lanes(|lane| motions[lane].velocities[i][axis]);
-                *slope = Vec3::new(at(0), at(1), at(2)) * dt;
+        for (lane, motion) in motions.iter().enumerate() {
+            for (slope, v) in self.end_slopes.iter_mut().zip(&motion.velocities) {
+                slope.x.load_lane(lane, v.x);
+                slope.y.load_lane(lane, v.y);
+                slope.z.load_lane(lane, v.z);
             }
-        } else {
-            for (lane, motion) in motions.iter().enumerate() {
-                for (i, slope) in self.end_slopes.iter_mut().enumerate() {
-                    match motion.velocities.get(i) {
-                        Some(v) => slope.set_lane(lane, [0, 1, 2].map(|a| f64::from(v[a]) * dt)),
-                        None => {
-                            let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
-                            slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
-                        }
-                    }
-                }
+        }
+        let step = R::splat(dt);
+        for slope in &mut self.end_slopes {
+            *slope = *slope * step;
+        }
+        for lane in (0..R::LANES).filter(|&lane| !has_velocity(lane)) {
+            for (i, slope) in self.end_slopes.iter_mut().enumerate() {
+                let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
+                slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
             }
         }
         for lane in 0..R::LANES {
@@ -49,32 +53,6 @@ impl<R: Real> Group<R> {
         }
         for (kept, motion) in self.end_positions.iter_mut().zip(&motions) {
             kept.copy_from_slice(&motion.positions);
-        }
-    }
-
-    pub(super) fn load_anchors(&mut self, dt: f64, anchors: &[PatchMotion]) {
-        for anchor in &mut self.anchors {
-            let old = anchor.segment;
-            for axis in 0..3 {
-                anchor.start[axis] += old[0][axis];
-            }
-            anchor.segment = [[0.0; 3]; 3];
-            let old_velocity = anchor.velocity.take();
-            let Some(motion) = anchors.get(self.patches[anchor.lane]) else {
-                continue;
-            };
-            let center = self.origin.lane(anchor.lane);
-            // Rounded as the targets are, so that an anchor on its target pulls not at all.
-            let mut end = Vec3::<R>::zero();
-            end.set_lane(0, relative(&motion.positions[anchor.index], center));
-            let end = end.lane(0);
-            let chord = [0, 1, 2].map(|axis| end[axis] - anchor.start[axis]);
-            anchor.velocity = motion
-                .velocities
-                .get(anchor.index)
-                .map(|v| [0, 1, 2].map(|axis| f64::from(v[axis])));
-            let slope = |v: Option<[f64; 3]>| v.map_or(chord, |v| v.map(|x| x * dt));
-            anchor.segment = [chord, slope(old_velocity), slope(anchor.velocity)];
         }
     }
 
@@ -107,7 +85,7 @@ impl<R: Real> Group<R> {
 
     /// Energies of all lanes at the end of the frame.
     #[inline(always)]
-    pub(super) fn energy_lanes(&mut self) -> [R; 7] {
+    pub(super) fn energy_lanes(&mut self) -> [R; 9] {
         let half = R::splat(0.5);
         let (mut kinetic, mut magnet) = (R::splat(0.0), R::splat(0.0));
         for i in 0..self.displacements.len() {
@@ -148,6 +126,7 @@ impl<R: Real> Group<R> {
             pressure = half * self.pressure * volume * volume;
         }
         self.squared_distance = magnet;
+        let [anchors, held_off] = self.anchor_energies();
         [
             half * self.mass * kinetic,
             half * self.magnet.stiffness * magnet,
@@ -156,23 +135,9 @@ impl<R: Real> Group<R> {
             shear,
             bend,
             pressure,
+            anchors,
+            held_off,
         ]
-    }
-
-    /// Anchor energy of a lane, and the energy an anchor would have on the target.
-    pub(super) fn anchor_energies(&self) -> Vec<[f64; 2]> {
-        let mut sums = vec![[0.0; 2]; self.patches.len()];
-        for anchor in &self.anchors {
-            let (node, lane) = (anchor.node, anchor.lane);
-            let target = self.ends[node].lane(lane);
-            let u = self.displacements[node].lane(lane);
-            for axis in 0..3 {
-                let a = anchor.start[axis] + anchor.segment[0][axis] - target[axis];
-                sums[lane][0] += 0.5 * anchor.stiffness * (u[axis] - a).powi(2);
-                sums[lane][1] += 0.5 * anchor.stiffness * a * a;
-            }
-        }
-        sums
     }
 
     pub(super) fn clear_lane(&mut self, lane: usize) {

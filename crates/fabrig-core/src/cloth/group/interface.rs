@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::cloth::constraints::attachment::Port;
+use crate::cloth::constraints::attachment::PairEnd;
 use crate::cloth::input::PatchMotion;
 use crate::cloth::report::Energies;
 
@@ -29,7 +29,7 @@ pub(crate) struct Substep {
 /// The pairs of a group's nodes with nodes of other patches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GroupPairs {
-    /// (node, lane) of every node that has pairs.
+    /// (node, lane) of every node that has pairs: the ports of the group.
     pub(crate) nodes: Vec<(u32, u32)>,
     /// Partners of each such node.
     pub(crate) partners: Vec<Vec<Partner>>,
@@ -46,6 +46,17 @@ pub(crate) struct Partner {
     pub(crate) stiffness: f64,
 }
 
+/// What a group tells the others of its paired nodes.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ports {
+    /// Predicted displacement of each from its target. (mm)
+    pub(crate) displacements: Vec<[f64; 3]>,
+    /// What each brings into its pairs.
+    pub(crate) ends: Vec<PairEnd>,
+    /// How often the masses have changed; for these [`Ports::ends`] hold.
+    pub(crate) version: u64,
+}
+
 /// What the energy monitor looks at, per patch.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Monitor {
@@ -58,6 +69,8 @@ pub(crate) struct Monitor {
     pub(crate) drive: f64,
     /// Energy by which rest lengths and anchors differ from the targets.
     pub(crate) mismatch: f64,
+    /// Rate at which damping takes velocity away. (1/s)
+    pub(crate) damping: f64,
     /// Displacements that were held back.
     pub(crate) clamped: u64,
     /// Whether all of the state is finite and near.
@@ -68,16 +81,16 @@ pub(crate) struct Monitor {
 pub(crate) trait PatchGroup: Send + Sync {
     /// Patches of the lanes.
     fn patches(&self) -> &[usize];
-    /// Replaces the pairs.
-    fn set_pairs(&mut self, pairs: GroupPairs);
+    /// Replaces the pairs; `group` is this one's index.
+    fn set_pairs(&mut self, group: usize, pairs: GroupPairs);
     /// Puts the cloth on the targets, moving with them.
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Starts a frame of `dt` seconds.
     fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Before the constraints of a substep: up to the inertial target. Fills `ports`.
-    fn predict(&mut self, substep: &Substep, ports: &mut Vec<Port>);
+    fn predict(&mut self, substep: &Substep, ports: &mut Ports);
     /// The constraints of a substep. Reads the ports of all groups.
-    fn solve(&mut self, substep: &Substep, ports: &[Vec<Port>]);
+    fn solve(&mut self, substep: &Substep, ports: &[Ports]);
     /// Whether a hook has the last word on positions from now on.
     fn set_hooked(&mut self, is_hooked: bool);
     /// After the constraints: holds steps back as the end of the substep would without a hook.
@@ -97,7 +110,7 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn finish(&mut self);
     /// [`PatchGroup::finish`], and then [`PatchGroup::predict`] for the substep that follows in
     /// the same frame, in one pass.
-    fn turn(&mut self, following: &Substep, ports: &mut Vec<Port>);
+    fn turn(&mut self, following: &Substep, ports: &mut Ports);
     /// Ends the frame: what the monitor sees, per patch.
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>);
     /// Takes backward Euler steps for a patch for `frames` frames, solved by descent if

@@ -3,9 +3,11 @@
 //! Everything a substep needs is kept as arrays of one entry per node (or edge), each entry
 //! holding that node of every patch. Nothing is allocated while stepping.
 
+mod anchors;
 mod descent;
 mod dispatch;
 mod frame;
+mod instructions;
 mod interface;
 mod pairs;
 mod paper;
@@ -14,6 +16,8 @@ mod state;
 mod substep;
 mod sweeps;
 
-pub(crate) use dispatch::{Widest, vectorized};
-pub(crate) use interface::{GroupPairs, Monitor, Partner, PatchGroup, Substep};
+#[cfg(test)]
+pub(crate) use instructions::tests::with_baseline;
+pub(crate) use instructions::vectorized;
+pub(crate) use interface::{GroupPairs, Monitor, Partner, PatchGroup, Ports, Substep};
 pub(crate) use state::Group;

@@ -7,11 +7,9 @@
 //! baseline shows.
 
 use super::interface::Substep;
+use super::solve::SweepCompliance;
 use super::state::Group;
-use crate::cloth::constraints::bend::{BendCompliance, project_bend};
-use crate::cloth::constraints::pressure::project_pressure;
-use crate::cloth::constraints::shear::project_shear;
-use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
+use crate::cloth::constraints::stretch::StretchCompliance;
 use crate::cloth::lanes::Real;
 
 /// The step that shares are calibrated for. (s)
@@ -40,19 +38,16 @@ impl<R: Real> Group<R> {
     /// The projections of a substep.
     #[inline(always)]
     pub(super) fn project_lanes(&mut self, substep: &Substep, sweeps: u32) {
-        let progress = R::splat(substep.progress[1]);
-        let stretch = StretchCompliance {
-            stretch: self.share_compliance(self.stretch[0], 2.0, sweeps),
-            compression: self.share_compliance(self.stretch[1], 2.0, sweeps),
-            gamma: R::splat(0.0),
+        let compliance = SweepCompliance {
+            pressure: R::splat(f64::from(sweeps)) / (self.pressure * R::splat(STEP * STEP)),
+            bend: self.share_compliance(self.bend, 6.0, sweeps),
+            shear: self.share_compliance(self.shear, 2.0, sweeps),
+            stretch: StretchCompliance {
+                stretch: self.share_compliance(self.stretch[0], 2.0, sweeps),
+                compression: self.share_compliance(self.stretch[1], 2.0, sweeps),
+                gamma: R::splat(0.0),
+            },
         };
-        let shear = self.share_compliance(self.shear, 2.0, sweeps);
-        let bend = BendCompliance {
-            compliance: self.share_compliance(self.bend, 6.0, sweeps),
-            dropoff: self.bend_dropoff,
-            inv_edge_squared: self.inv_edge_squared,
-        };
-        let volume = R::splat(f64::from(sweeps)) / (self.pressure * R::splat(STEP * STEP));
         let mut kept = R::splat(1.0);
         for lane in 0..R::LANES {
             let w = 1.0 / self.mass.lane(lane);
@@ -70,58 +65,8 @@ impl<R: Real> Group<R> {
             for x in &mut self.solution {
                 *x = *x * kept;
             }
-            self.share_anchors(sweeps);
-            if self.has_pressure {
-                project_pressure(
-                    &self.lists.cells,
-                    &self.targets,
-                    &mut self.solution,
-                    &self.inv_masses,
-                    volume,
-                    &mut self.gradient,
-                );
-            }
-            project_bend(
-                &self.lists.triples,
-                &mut self.solution,
-                &self.inv_masses,
-                &bend,
-            );
-            for (x, target) in self.solution.iter_mut().zip(&self.targets) {
-                *x = *target + *x;
-            }
-            project_shear(
-                &self.lists.diagonals,
-                &mut self.solution,
-                &self.inv_masses,
-                &self.diagonal_lengths,
-                progress,
-                shear,
-            );
-            project_stretch(
-                &self.lists.edges,
-                &mut self.solution,
-                &self.inv_masses,
-                &self.edge_lengths,
-                &self.resting,
-                progress,
-                &stretch,
-            );
-        }
-    }
-
-    fn share_anchors(&mut self, sweeps: u32) {
-        for k in 0..self.anchors.len() {
-            let (node, lane) = (self.anchors[k].node, self.anchors[k].lane);
-            let offset = self.anchor_offset(k);
-            let s = share(
-                self.anchors[k].stiffness,
-                1.0 / self.mass.lane(lane),
-                sweeps,
-            );
-            let u = self.solution[node].lane(lane);
-            let moved = [0, 1, 2].map(|axis| u[axis] + s * (offset[axis] - u[axis]));
-            self.solution[node].set_lane(lane, moved);
+            self.share_anchors(|k, mass| share(k, 1.0 / mass, sweeps));
+            self.sweep_once(R::splat(substep.progress[1]), &compliance);
         }
     }
 }

@@ -8,57 +8,101 @@ use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
 use crate::cloth::lanes::Real;
 
+/// Compliances of one sweep.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SweepCompliance<R> {
+    /// Of the volume. [mm^4/mass]
+    pub(super) pressure: R,
+    /// Of second differences. [1/mass]
+    pub(super) bend: R,
+    /// Of diagonals. [1/mass]
+    pub(super) shear: R,
+    /// Of edges.
+    pub(super) stretch: StretchCompliance<R>,
+}
+
 impl<R: Real> Group<R> {
+    /// The sweep that means the material: compliance 1/(k h_e^2).
     #[inline(always)]
     pub(super) fn solve_lanes(&mut self, substep: &Substep) {
         let h_e2 = self.h_e * self.h_e;
         let one = R::splat(1.0);
-        let progress = R::splat(substep.progress[1]);
+        let compliance = SweepCompliance {
+            pressure: one / (self.pressure * h_e2),
+            bend: one / (self.bend * h_e2),
+            shear: one / (self.shear * h_e2),
+            stretch: StretchCompliance {
+                stretch: one / (self.stretch[0] * h_e2),
+                compression: one / (self.stretch[1] * h_e2),
+                gamma: self.stretch_damping_time / self.h_e,
+            },
+        };
+        self.sweep_once(R::splat(substep.progress[1]), &compliance);
+    }
+
+    /// Projects every constraint once, from displacements to positions. What has no stiffness in
+    /// any lane would move nothing and is left out.
+    ///
+    /// - `progress`: how far through the frame, 0 to 1
+    #[inline(always)]
+    pub(super) fn sweep_once(&mut self, progress: R, compliance: &SweepCompliance<R>) {
         if self.has_pressure {
             project_pressure(
                 &self.lists.cells,
                 &self.targets,
                 &mut self.solution,
                 &self.inv_masses,
-                one / (self.pressure * h_e2),
+                compliance.pressure,
                 &mut self.gradient,
             );
         }
-        let bend = BendCompliance {
-            compliance: one / (self.bend * h_e2),
-            dropoff: self.bend_dropoff,
-            inv_edge_squared: self.inv_edge_squared,
-        };
-        project_bend(
-            &self.lists.triples,
-            &mut self.solution,
-            &self.inv_masses,
-            &bend,
-        );
+        if self.has_bend {
+            let bend = BendCompliance {
+                compliance: compliance.bend,
+                dropoff: self.bend_dropoff,
+                inv_edge_squared: self.inv_edge_squared,
+            };
+            project_bend(
+                &self.lists.triples,
+                &mut self.solution,
+                &self.inv_masses,
+                &bend,
+            );
+        }
         for (x, target) in self.solution.iter_mut().zip(&self.targets) {
             *x = *target + *x;
         }
-        project_shear(
-            &self.lists.diagonals,
-            &mut self.solution,
-            &self.inv_masses,
-            &self.diagonal_lengths,
-            progress,
-            one / (self.shear * h_e2),
-        );
-        let compliance = StretchCompliance {
-            stretch: one / (self.stretch[0] * h_e2),
-            compression: one / (self.stretch[1] * h_e2),
-            gamma: self.stretch_damping_time / self.h_e,
-        };
-        project_stretch(
+        if self.has_shear {
+            project_shear(
+                &self.lists.diagonals,
+                &mut self.solution,
+                &self.inv_masses,
+                &self.diagonal_lengths,
+                progress,
+                compliance.shear,
+            );
+        }
+        if self.has_stretch_damping {
+            self.stretch_all::<true>(progress, &compliance.stretch);
+        } else {
+            self.stretch_all::<false>(progress, &compliance.stretch);
+        }
+    }
+
+    #[inline(always)]
+    fn stretch_all<const IS_DAMPED: bool>(
+        &mut self,
+        progress: R,
+        compliance: &StretchCompliance<R>,
+    ) {
+        project_stretch::<R, IS_DAMPED>(
             &self.lists.edges,
             &mut self.solution,
             &self.inv_masses,
             &self.edge_lengths,
             &self.resting,
             progress,
-            &compliance,
+            compliance,
         );
     }
 }

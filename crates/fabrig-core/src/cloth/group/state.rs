@@ -2,8 +2,9 @@
 
 use nalgebra::Point3;
 
+use super::anchors::{Anchor, anchors};
 use super::descent::Incidence;
-use super::interface::GroupPairs;
+use super::pairs::PairTable;
 use super::sweeps::Multipliers;
 use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::magnet::Magnet;
@@ -11,26 +12,10 @@ use crate::cloth::constraints::stretch::{RestLengths, edge_length};
 use crate::cloth::constraints::wind::Air;
 use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator, Mode};
 use crate::cloth::lanes::{Real, Vec3};
+use crate::cloth::materials::Material;
 
 /// Displacements further than this are taken for a failure. (mm)
 pub(super) const FARTHEST: f64 = 1e5;
-
-/// An anchored node.
-#[derive(Debug, Clone)]
-pub(super) struct Anchor {
-    pub(super) node: usize,
-    pub(super) lane: usize,
-    /// Index among the anchors of its patch.
-    pub(super) index: usize,
-    /// k. [mass/s^2]
-    pub(super) stiffness: f64,
-    /// Position at the end of the frame before. [mm, relative to the patch's centre]
-    pub(super) start: [f64; 3],
-    /// Hermite segment of this frame: chord and slopes. (mm)
-    pub(super) segment: [[f64; 3]; 3],
-    /// Velocity at the end of the frame, if known. (mm/s)
-    pub(super) velocity: Option<[f64; 3]>,
-}
 
 /// Per-lane bookkeeping.
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,6 +36,9 @@ pub(crate) struct Group<R> {
     pub(super) mode: Mode,
     pub(super) sweeps: u32,
     pub(super) has_pressure: bool,
+    pub(super) has_shear: bool,
+    pub(super) has_bend: bool,
+    pub(super) has_stretch_damping: bool,
     /// Centre of each patch, which positions are relative to. [mm, head frame]
     pub(super) origin: Vec3<R>,
 
@@ -73,8 +61,8 @@ pub(crate) struct Group<R> {
     pub(super) inv_air_mass: R,
     /// Sum of anchor stiffnesses per node. [mass/s^2]
     pub(super) anchor_stiffness: Vec<R>,
-    pub(super) anchors: Vec<Anchor>,
-    pub(super) pairs: GroupPairs,
+    pub(super) anchors: Vec<Anchor<R>>,
+    pub(super) pairs: PairTable,
 
     pub(super) lists: GridLists,
     pub(super) edge_lengths: RestLengths<R>,
@@ -121,8 +109,9 @@ pub(crate) struct Group<R> {
     pub(super) trial: Vec<Vec3<R>>,
     pub(super) scratch: Vec<Vec3<R>>,
 
-    /// Effective step for which `inv_masses` holds.
+    /// Effective step for which `inv_masses` holds, and how often they have changed.
     pub(super) masses_h_e: R,
+    pub(super) masses_version: u64,
     pub(super) h_e: R,
     /// 1/h_e of the substep that is being finished. (1/s)
     pub(super) inv_h: R,
@@ -171,30 +160,7 @@ impl<R: Real> Group<R> {
         }
         let lists = GridLists::new(shape);
         let mean_edge = mean_edge(&lists.edges, &rest);
-        let area = |p: &ClothPatch| rest_area(p);
-        let mut anchor_stiffness = vec![R::splat(0.0); n];
-        let mut anchors = Vec::new();
-        for (lane, &patch) in patches.iter().enumerate() {
-            let mut index = 0;
-            for (nodes, strength) in all[patch].anchor_sets() {
-                let stiffness = strength * all[patch].material.stretch_stiffness();
-                for &node in nodes {
-                    let node = node as usize;
-                    let sum = anchor_stiffness[node].lane(lane) + stiffness;
-                    anchor_stiffness[node].set_lane(lane, sum);
-                    anchors.push(Anchor {
-                        node,
-                        lane,
-                        index,
-                        stiffness,
-                        start: rest[node].lane(lane),
-                        segment: [[0.0; 3]; 3],
-                        velocity: None,
-                    });
-                    index += 1;
-                }
-            }
-        }
+        let (anchors, anchor_stiffness) = anchors(all, patches, &rest);
         let blends = |edges: &[[u32; 2]]| -> Vec<R> {
             edges
                 .iter()
@@ -204,6 +170,9 @@ impl<R: Real> Group<R> {
                     R::splat(blend.clamp(0.0, 1.0))
                 })
                 .collect()
+        };
+        let has = |number: &dyn Fn(&Material) -> f64| {
+            patches.iter().any(|&p| number(&all[p].material) > 0.0)
         };
         // A grid without edges has no measure to hold displacements to.
         let edge_limit_squared = R::select_less(
@@ -217,7 +186,10 @@ impl<R: Real> Group<R> {
             integrator: options.integrator,
             mode: options.mode,
             sweeps: options.sweeps,
-            has_pressure: patches.iter().any(|&p| all[p].material.pressure > 0.0),
+            has_pressure: has(&|m| m.pressure),
+            has_shear: has(&|m| m.shear_resistance),
+            has_bend: has(&|m| m.bend_resistance),
+            has_stretch_damping: has(&|m| m.stretch_damping),
             origin,
             mass: per_lane(&|p| p.material.mass),
             magnet: Magnet {
@@ -233,7 +205,7 @@ impl<R: Real> Group<R> {
             shear: per_lane(&|p| p.material.shear_stiffness()),
             bend: per_lane(&|p| p.material.bend_stiffness()),
             bend_dropoff: per_lane(&|p| p.material.bend_angle_dropoff),
-            pressure: per_lane(&|p| p.material.pressure_stiffness(n, area(p))),
+            pressure: per_lane(&|p| p.material.pressure_stiffness(n, p.area())),
             inv_edge_squared: R::splat(1.0) / (mean_edge * mean_edge).max(R::splat(1e-12)),
             clamp_squared: edge_limit_squared,
             edge_limit_squared,
@@ -243,11 +215,11 @@ impl<R: Real> Group<R> {
                 lift: R::splat(options.lift),
             },
             inv_air_mass: per_lane(&|p| {
-                n as f64 / (options.areal_density * p.material.mass * area(p)).max(1e-12)
+                n as f64 / (options.areal_density * p.material.mass * p.area()).max(1e-12)
             }),
             anchor_stiffness,
             anchors,
-            pairs: GroupPairs::default(),
+            pairs: PairTable::default(),
             edge_lengths: RestLengths::new(&rest, &lists.edges, blends(&lists.edges)),
             diagonal_lengths: RestLengths::new(&rest, &lists.diagonals, blends(&lists.diagonals)),
             lists,
@@ -278,6 +250,7 @@ impl<R: Real> Group<R> {
             scratch: zero.clone(),
             gradient: zero,
             masses_h_e: R::splat(-1.0),
+            masses_version: 0,
             h_e: R::splat(0.0),
             inv_h: R::splat(0.0),
             weights: [[0.0; 3]; 2],
@@ -291,6 +264,16 @@ impl<R: Real> Group<R> {
 }
 
 impl ClothPatch {
+    /// Area at rest. [mm^2]
+    pub(crate) fn area(&self) -> f64 {
+        let at = |i: u32| self.rest[i as usize].map(f64::from);
+        self.shape
+            .quads()
+            .iter()
+            .map(|&[a, b, c, d]| (at(c) - at(a)).cross(&(at(d) - at(b))).norm() / 2.0)
+            .sum()
+    }
+
     /// Nodes and strength of each set of anchors, in order.
     pub(crate) fn anchor_sets(&self) -> impl Iterator<Item = (&[u32], f64)> {
         self.attachments.iter().filter_map(|a| match a {
@@ -312,17 +295,6 @@ fn mean_edge<R: Real>(edges: &[[u32; 2]], positions: &[Vec3<R>]) -> R {
         sum += edge_length(positions[i as usize], positions[j as usize]);
     }
     sum / R::splat(edges.len().max(1) as f64)
-}
-
-/// Area of a patch at rest. [mm^2]
-fn rest_area(patch: &ClothPatch) -> f64 {
-    let at = |i: u32| patch.rest[i as usize].map(f64::from);
-    patch
-        .shape
-        .quads()
-        .iter()
-        .map(|&[a, b, c, d]| (at(c) - at(a)).cross(&(at(d) - at(b))).norm() / 2.0)
-        .sum()
 }
 
 /// Noise in [-1, 1] for the edge of two nodes, the same in every patch (SplitMix64's

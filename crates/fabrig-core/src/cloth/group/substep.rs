@@ -5,7 +5,6 @@
 
 use super::interface::Substep;
 use super::state::Group;
-use crate::cloth::constraints::attachment::anchor_pull;
 use crate::cloth::constraints::damping::damping_mass;
 use crate::cloth::constraints::inertia::{FrameForces, frame_acceleration};
 use crate::cloth::constraints::wind::add_wind;
@@ -21,6 +20,47 @@ struct NodeMotion<R> {
     previous_u: Vec3<R>,
     v: Vec3<R>,
     previous_v: Vec3<R>,
+}
+
+/// Hermite segments of all nodes over a frame. (mm)
+struct Segments<'a, R> {
+    chords: &'a [Vec3<R>],
+    start_slopes: &'a [Vec3<R>],
+    end_slopes: &'a [Vec3<R>],
+}
+
+impl<R: Real> Segments<'_, R> {
+    /// Part of a node's segment. (mm)
+    #[inline(always)]
+    fn weighted(&self, i: usize, [chord, start, end]: [R; 3]) -> Vec3<R> {
+        self.chords[i] * chord + self.start_slopes[i] * start + self.end_slopes[i] * end
+    }
+}
+
+/// Holds displacements back, and counts.
+struct Clamp<R> {
+    /// Half an edge, squared. [mm^2]
+    limit: R,
+    count: R,
+}
+
+impl<R: Real> Clamp<R> {
+    /// `step` of a displacement, held to half an edge, measured against the head or against the
+    /// target that moves by `target_step`, whichever is less: a cloth that follows its target
+    /// and one that ignores it both move as they should. (mm)
+    #[inline(always)]
+    fn held(&mut self, step: Vec3<R>, target_step: Vec3<R>) -> Vec3<R> {
+        let limit = self.limit;
+        let moved = step + target_step;
+        let (relative, absolute) = (step.dot(step), moved.dot(moved));
+        let squared = R::select_less(relative, absolute, relative, absolute);
+        if R::any_less(limit, squared) {
+            self.count += R::select_less(limit, squared, R::splat(1.0), R::splat(0.0));
+            step * (limit / squared.max(limit)).sqrt()
+        } else {
+            step
+        }
+    }
 }
 
 /// What predicting a substep has in common for all nodes.
@@ -105,6 +145,7 @@ impl<R: Real> Group<R> {
             return;
         }
         self.masses_h_e = h_e;
+        self.masses_version += 1;
         let damped = self.mass + damping_mass(self.mass, self.damping, h_e);
         if self.mode == Mode::Paper {
             // Springs are projected, all of them.
@@ -152,7 +193,6 @@ impl<R: Real> Group<R> {
     pub(super) fn predict_lanes(&mut self, substep: &Substep) {
         let prediction = self.begin_substep(substep);
         self.predict_all::<false>(substep, &prediction);
-        self.pull_to_anchors();
     }
 
     /// End of a substep and first half of the one that follows in the same frame.
@@ -164,7 +204,6 @@ impl<R: Real> Group<R> {
             let prediction = self.begin_substep(substep);
             self.inv_h = inv_h;
             self.predict_all::<true>(substep, &prediction);
-            self.pull_to_anchors();
         } else {
             self.finish_lanes();
             self.predict_lanes(substep);
@@ -181,19 +220,25 @@ impl<R: Real> Group<R> {
             R::splat(after[1] - before[1]),
             R::splat(after[2] - before[2]),
         ];
+        let mut clamp = Clamp {
+            limit: self.clamp_squared,
+            count: self.clamped,
+        };
         for i in 0..self.solution.len() {
-            let step = self.weighted(i, weights);
-            let now = self.finish_node(i, step);
-            self.target_steps[i] = step;
-            self.displacements[i] = now.u;
-            self.previous_displacements[i] = now.previous_u;
-            self.velocities[i] = now.v;
-            self.previous_velocities[i] = now.previous_v;
+            let target_step = self.segments().weighted(i, weights);
+            let (u, v) = (self.displacements[i], self.velocities[i]);
+            let now = u + clamp.held(self.solution[i] - self.targets[i] - u, target_step);
+            self.target_steps[i] = target_step;
+            self.displacements[i] = now;
+            self.previous_displacements[i] = u;
+            self.velocities[i] = (now - self.past[i]) * self.inv_h;
+            self.previous_velocities[i] = v;
         }
+        self.clamped = clamp.count;
     }
 
-    /// Holds displacements in the solution itself, for a hook to see: as [`Self::finish_node`]
-    /// does, which then no longer has to.
+    /// Holds displacements in the solution itself, for a hook to see: as [`Clamp::held`] does,
+    /// which then no longer has to.
     #[inline(always)]
     pub(super) fn hold_back_lanes(&mut self) {
         let [before, after] = self.weights;
@@ -202,7 +247,7 @@ impl<R: Real> Group<R> {
         for i in 0..self.solution.len() {
             let old = self.displacements[i];
             let step = self.solution[i] - self.targets[i] - old;
-            let moved = step + self.weighted(i, weights);
+            let moved = step + self.segments().weighted(i, weights);
             let (relative, absolute) = (step.dot(step), moved.dot(moved));
             let squared = R::select_less(relative, absolute, relative, absolute);
             if !R::any_less(limit, squared) {
@@ -239,6 +284,9 @@ impl<R: Real> Group<R> {
         } else {
             self.predict_in::<IS_TURN, _>(&Uniform(Vec3::splat(substep.uniform)), p)
         };
+        if self.mode != Mode::Paper {
+            self.pull_to_anchors();
+        }
         self.drive += (R::splat(0.5) * self.mass * squared).sqrt() * R::splat(substep.h);
     }
 
@@ -247,20 +295,52 @@ impl<R: Real> Group<R> {
     #[inline(always)]
     fn predict_in<const IS_TURN: bool, F: Field<R>>(&mut self, field: &F, p: &Prediction<R>) -> R {
         let h_e2 = p.h_e * p.h_e;
+        let n = self.solution.len();
+        // Slices of one length, so that the loop checks no bounds.
+        let segments = Segments {
+            chords: &self.chords[..n],
+            start_slopes: &self.start_slopes[..n],
+            end_slopes: &self.end_slopes[..n],
+        };
+        let (starts, inv_masses) = (&self.starts[..n], &self.inv_masses[..n]);
+        let anchors = &self.anchor_stiffness[..n];
+        let previous_us = &self.previous_displacements[..n];
+        let previous_vs = &self.previous_velocities[..n];
+        let target_steps = &self.target_steps[..n];
+        let (us, vs) = (&mut self.displacements[..n], &mut self.velocities[..n]);
+        let (targets, pasts) = (&mut self.targets[..n], &mut self.past[..n]);
+        let (restings, solution) = (&mut self.resting[..n], &mut self.solution[..n]);
+        let mut clamp = Clamp {
+            limit: self.clamp_squared,
+            count: self.clamped,
+        };
         let mut squared = R::splat(0.0);
-        for i in 0..self.solution.len() {
+        for i in 0..n {
             let (m, last_step);
             if IS_TURN {
-                last_step = self.weighted(i, p.last_step);
-                m = self.finish_node(i, last_step);
-                self.displacements[i] = m.u;
-                self.velocities[i] = m.v;
+                last_step = segments.weighted(i, p.last_step);
+                let (u, v) = (us[i], vs[i]);
+                let moved = clamp.held(solution[i] - targets[i] - u, last_step);
+                let now = u + moved;
+                m = NodeMotion {
+                    u: now,
+                    previous_u: u,
+                    v: (now - pasts[i]) * self.inv_h,
+                    previous_v: v,
+                };
+                us[i] = m.u;
+                vs[i] = m.v;
             } else {
-                last_step = self.target_steps[i];
-                m = self.node_motion(i);
+                last_step = target_steps[i];
+                m = NodeMotion {
+                    u: us[i],
+                    previous_u: previous_us[i],
+                    v: vs[i],
+                    previous_v: previous_vs[i],
+                };
             }
-            let target = self.starts[i] + self.weighted(i, p.target);
-            let step = self.weighted(i, p.step);
+            let target = starts[i] + segments.weighted(i, p.target);
+            let step = segments.weighted(i, p.step);
             // As u + r (u - u'): weights that are rounded to a sum other than 1 would be a force.
             let change = m.u - m.previous_u;
             let ub = m.u + change * p.history;
@@ -274,54 +354,24 @@ impl<R: Real> Group<R> {
             // The mass-weighted mean of y, x_b, X + u_b and X, as a change of x_b: the rounding
             // of the weights' sum then does not act on x_b.
             let coasting = vb * p.h_e + acceleration * h_e2;
-            let draw = p.pull + self.anchor_stiffness[i] * p.anchored;
+            let draw = p.pull + anchors[i] * p.anchored;
             let top = coasting * self.mass + (ub - xb) * p.follow - xb * draw;
-            self.targets[i] = target;
-            self.past[i] = xb;
-            self.resting[i] = target + ub;
-            self.solution[i] = xb + top * self.inv_masses[i];
+            targets[i] = target;
+            pasts[i] = xb;
+            restings[i] = target + ub;
+            solution[i] = xb + top * inv_masses[i];
         }
+        self.clamped = clamp.count;
         squared
     }
 
-    /// Part of a node's Hermite segment. (mm)
+    /// Hermite segments of the frame.
     #[inline(always)]
-    fn weighted(&self, i: usize, [chord, start, end]: [R; 3]) -> Vec3<R> {
-        self.chords[i] * chord + self.start_slopes[i] * start + self.end_slopes[i] * end
-    }
-
-    #[inline(always)]
-    fn node_motion(&self, i: usize) -> NodeMotion<R> {
-        NodeMotion {
-            u: self.displacements[i],
-            previous_u: self.previous_displacements[i],
-            v: self.velocities[i],
-            previous_v: self.previous_velocities[i],
-        }
-    }
-
-    /// New motion of a node from the solution; its target moved by `target_step`. The
-    /// displacement is held to half an edge, measured against the head or against the moving
-    /// target, whichever is less: a cloth that follows its target and one that ignores it both
-    /// move as they should.
-    #[inline(always)]
-    fn finish_node(&mut self, i: usize, target_step: Vec3<R>) -> NodeMotion<R> {
-        let limit = self.clamp_squared;
-        let old = self.displacements[i];
-        let mut step = self.solution[i] - self.targets[i] - old;
-        let moved = step + target_step;
-        let (relative, absolute) = (step.dot(step), moved.dot(moved));
-        let squared = R::select_less(relative, absolute, relative, absolute);
-        if R::any_less(limit, squared) {
-            self.clamped += R::select_less(limit, squared, R::splat(1.0), R::splat(0.0));
-            step = step * (limit / squared.max(limit)).sqrt();
-        }
-        let u = old + step;
-        NodeMotion {
-            u,
-            previous_u: old,
-            v: (u - self.past[i]) * self.inv_h,
-            previous_v: self.velocities[i],
+    fn segments(&self) -> Segments<'_, R> {
+        Segments {
+            chords: &self.chords,
+            start_slopes: &self.start_slopes,
+            end_slopes: &self.end_slopes,
         }
     }
 
@@ -333,7 +383,7 @@ impl<R: Real> Group<R> {
         let horizon = R::splat(horizon);
         // The expected state, in an array that is free until later in the substep.
         for i in 0..self.solution.len() {
-            let target = self.starts[i] + self.weighted(i, now);
+            let target = self.starts[i] + self.segments().weighted(i, now);
             self.solution[i] = target + self.displacements[i] + self.velocities[i] * horizon;
         }
         self.wind_accelerations.fill(Vec3::zero());
@@ -346,31 +396,5 @@ impl<R: Real> Group<R> {
             self.inv_air_mass,
             &mut self.wind_accelerations,
         );
-    }
-
-    /// Draws anchored nodes to their anchors.
-    fn pull_to_anchors(&mut self) {
-        if self.mode == Mode::Paper {
-            return;
-        }
-        for k in 0..self.anchors.len() {
-            let anchor = &self.anchors[k];
-            let (node, lane) = (anchor.node, anchor.lane);
-            let h_e = self.h_e.lane(lane);
-            let (pull, _) = anchor_pull(self.anchor_offset(k), anchor.stiffness, h_e);
-            let w = self.inv_masses[node].lane(lane);
-            let u = self.solution[node].lane(lane);
-            self.solution[node].set_lane(lane, [0, 1, 2].map(|k| u[k] + pull[k] * w));
-        }
-    }
-
-    /// An anchor's offset from its node's target at the end of the substep. (mm)
-    pub(super) fn anchor_offset(&self, index: usize) -> [f64; 3] {
-        let (anchor, weights) = (&self.anchors[index], self.weights[1]);
-        let target = self.targets[anchor.node].lane(anchor.lane);
-        [0, 1, 2].map(|axis| {
-            let moved: f64 = (0..3).map(|k| weights[k] * anchor.segment[k][axis]).sum();
-            anchor.start[axis] + moved - target[axis]
-        })
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::support::*;
+use crate::cloth::group::with_baseline;
 use crate::cloth::{
     Cloth, ClothAttachment, ClothOptions, ClothPatch, FrameInput, Material, PatchMotion, Precision,
 };
@@ -89,6 +90,16 @@ fn bits_are_equal_in_and_out_of_lanes() {
                 scalar.node_state(patch, node)
             );
         }
+    }
+}
+
+#[test]
+fn bits_are_equal_for_any_vector_instructions() {
+    let patches = scene();
+    let widest = run(&patches, Precision::Single, 1.0, 6);
+    let baseline = with_baseline(|| run(&patches, Precision::Single, 1.0, 6));
+    for patch in 0..patches.len() {
+        assert_eq!(widest.positions(patch), baseline.positions(patch));
     }
 }
 

@@ -1,41 +1,14 @@
 //! Patches, targets and runs that the tests share.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::cloth::{
     Cloth, ClothOptions, ClothPatch, FrameInput, GridShape, Material, PatchMotion, StepReport,
 };
 
-pub(super) const DT: f64 = 1.0 / 60.0;
-
-/// A domed patch of 2 mm edges, `offset` to the side, mirrored if `sign` is -1.
-pub(super) fn dome(
-    u_count: u32,
-    v_count: u32,
-    offset: f32,
-    sign: f32,
-    material: Material,
-) -> ClothPatch {
-    let mut rest = Vec::new();
-    for v in 0..v_count {
-        for u in 0..u_count {
-            let x = u as f32 * 2.0 + offset;
-            let y = v as f32 * 2.0 - 20.0;
-            let z = 80.0 - 0.012 * (x - 30.0) * (x - 30.0) - 0.01 * y * y;
-            rest.push(Point3::new(sign * x, y, z));
-        }
-    }
-    ClothPatch {
-        shape: GridShape {
-            u_count,
-            v_count,
-            is_periodic: false,
-        },
-        rest,
-        material,
-        attachments: Vec::new(),
-    }
-}
+pub(super) use crate::cloth::bench::stability::patches::{
+    DT, contracted, dome_at as dome, rms, shifted,
+};
 
 /// A ring of 48 x 15 about (0, -40, 70).
 pub(super) fn ring(material: Material) -> ClothPatch {
@@ -65,25 +38,6 @@ pub(super) fn ring(material: Material) -> ClothPatch {
     }
 }
 
-/// The patch contracted along x by `contraction` towards its first column and lifted by
-/// `lift` mm in the middle.
-pub(super) fn contracted(patch: &ClothPatch, contraction: f32, lift: f32) -> Vec<Point3<f32>> {
-    let first = patch.rest[0].x;
-    patch
-        .rest
-        .iter()
-        .map(|p| {
-            let along = (p.x - first) / 40.0;
-            let bump = (along.abs() * std::f32::consts::PI).sin();
-            Point3::new(
-                p.x - contraction * (p.x - first),
-                p.y + 0.3 * lift * bump,
-                p.z + lift * bump,
-            )
-        })
-        .collect()
-}
-
 /// Targets that go smoothly between rest and a pose, at `frame`, with a period of 40 frames
 /// (positions and velocities).
 pub(super) fn swing(patch: &ClothPatch, pose: &[Point3<f32>], t: f64) -> PatchMotion {
@@ -107,17 +61,6 @@ pub(super) fn hold(cloth: &mut Cloth, targets: &[PatchMotion], frames: usize) ->
         last = cloth.step(&FrameInput::new(DT, targets)).unwrap();
     }
     last
-}
-
-/// Root mean square distance of a patch to positions. (mm)
-pub(super) fn rms(cloth: &Cloth, patch: usize, to: &[Point3<f32>]) -> f64 {
-    let sum: f64 = cloth
-        .positions(patch)
-        .iter()
-        .zip(to)
-        .map(|(a, b)| f64::from((a - b).norm_squared()))
-        .sum();
-    (sum / to.len() as f64).sqrt()
 }
 
 /// A cloth of one patch.
@@ -153,9 +96,4 @@ pub(super) fn single(material: Material) -> ClothPatch {
         material,
         attachments: Vec::new(),
     }
-}
-
-/// Every position moved by the same vector.
-pub(super) fn shifted(points: &[Point3<f32>], by: Vector3<f32>) -> Vec<Point3<f32>> {
-    points.iter().map(|p| p + by).collect()
 }

@@ -4,8 +4,9 @@
 //! `fabrig bench stability` and, in its short form, by the tests.
 
 mod cases;
-mod patches;
+pub(crate) mod patches;
 mod random;
+mod sides;
 
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +59,7 @@ impl Extent {
     /// What a test run can afford.
     pub const SHORT: Self = Self {
         held_frames: 5_000,
-        random_scenes: 40,
+        random_scenes: 120,
     };
     /// What `fabrig bench stability` runs.
     pub const USUAL: Self = Self {

@@ -7,14 +7,25 @@ use crate::cloth::{
 };
 
 /// (s)
-pub(super) const DT: f64 = 1.0 / 60.0;
+pub(crate) const DT: f64 = 1.0 / 60.0;
 
 /// A domed patch of 2 mm edges, to the right of the middle if `sign` is -1.
-pub(super) fn dome(u_count: u32, v_count: u32, sign: f32, material: Material) -> ClothPatch {
+pub(crate) fn dome(u_count: u32, v_count: u32, sign: f32, material: Material) -> ClothPatch {
+    dome_at(u_count, v_count, 10.0, sign, material)
+}
+
+/// The same with its first column at `offset` (mm) from the middle.
+pub(crate) fn dome_at(
+    u_count: u32,
+    v_count: u32,
+    offset: f32,
+    sign: f32,
+    material: Material,
+) -> ClothPatch {
     let mut rest = Vec::new();
     for v in 0..v_count {
         for u in 0..u_count {
-            let (x, y) = (u as f32 * 2.0 + 10.0, v as f32 * 2.0 - 20.0);
+            let (x, y) = (u as f32 * 2.0 + offset, v as f32 * 2.0 - 20.0);
             let z = 80.0 - 0.012 * (x - 30.0) * (x - 30.0) - 0.01 * y * y;
             rest.push(Point3::new(sign * x, y, z));
         }
@@ -32,7 +43,7 @@ pub(super) fn dome(u_count: u32, v_count: u32, sign: f32, material: Material) ->
 }
 
 /// The patch contracted towards its first node by a share and lifted in the middle. (mm)
-pub(super) fn contracted(patch: &ClothPatch, share: f32, lift: f32) -> Vec<Point3<f32>> {
+pub(crate) fn contracted(patch: &ClothPatch, share: f32, lift: f32) -> Vec<Point3<f32>> {
     let first = patch.rest[0].x;
     patch
         .rest
@@ -49,7 +60,7 @@ pub(super) fn contracted(patch: &ClothPatch, share: f32, lift: f32) -> Vec<Point
 }
 
 /// Every position moved alike.
-pub(super) fn shifted(points: &[Point3<f32>], by: Vector3<f32>) -> Vec<Point3<f32>> {
+pub(crate) fn shifted(points: &[Point3<f32>], by: Vector3<f32>) -> Vec<Point3<f32>> {
     points.iter().map(|p| p + by).collect()
 }
 
@@ -58,7 +69,7 @@ pub(super) fn shifted(points: &[Point3<f32>], by: Vector3<f32>) -> Vec<Point3<f3
 /// # Panics
 ///
 /// If the case is not well made.
-pub(super) fn cloth(patches: &[ClothPatch], options: &ClothOptions) -> Cloth {
+pub(crate) fn cloth(patches: &[ClothPatch], options: &ClothOptions) -> Cloth {
     Cloth::new(patches, options).expect("the case is well made")
 }
 
@@ -67,14 +78,14 @@ pub(super) fn cloth(patches: &[ClothPatch], options: &ClothOptions) -> Cloth {
 /// # Panics
 ///
 /// If the case is not well made.
-pub(super) fn step(cloth: &mut Cloth, dt: f64, targets: &[PatchMotion]) -> StepReport {
+pub(crate) fn step(cloth: &mut Cloth, dt: f64, targets: &[PatchMotion]) -> StepReport {
     cloth
         .step(&FrameInput::new(dt, targets))
         .expect("the frame is well made")
 }
 
 /// Frames on fixed targets; the last report, with the guards of all.
-pub(super) fn hold(cloth: &mut Cloth, poses: &[&[Point3<f32>]], frames: usize) -> StepReport {
+pub(crate) fn hold(cloth: &mut Cloth, poses: &[&[Point3<f32>]], frames: usize) -> StepReport {
     let targets: Vec<PatchMotion> = poses.iter().map(|p| PatchMotion::still(p)).collect();
     let mut last = StepReport::default();
     for _ in 0..frames {
@@ -86,7 +97,7 @@ pub(super) fn hold(cloth: &mut Cloth, poses: &[&[Point3<f32>]], frames: usize) -
 }
 
 /// RMS distance of a patch to positions, infinite where one is no number. (mm)
-pub(super) fn rms(cloth: &Cloth, patch: usize, to: &[Point3<f32>]) -> f64 {
+pub(crate) fn rms(cloth: &Cloth, patch: usize, to: &[Point3<f32>]) -> f64 {
     let positions = cloth.positions(patch);
     let sum: f64 = positions
         .iter()
@@ -98,7 +109,7 @@ pub(super) fn rms(cloth: &Cloth, patch: usize, to: &[Point3<f32>]) -> f64 {
 }
 
 /// Largest distance of two sets of positions. (mm)
-pub(super) fn farthest(a: &[Point3<f32>], b: &[Point3<f32>]) -> f64 {
+pub(crate) fn farthest(a: &[Point3<f32>], b: &[Point3<f32>]) -> f64 {
     a.iter()
         .zip(b)
         .map(|(p, q)| f64::from((p - q).norm()))

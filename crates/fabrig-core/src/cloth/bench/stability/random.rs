@@ -49,11 +49,10 @@ pub fn random_scenes(count: u64) -> [CaseResult; 2] {
         }
     }
     [
-        // Stiff cloth may stay crumpled, but within its own size.
         CaseResult::new(
             &format!("{count} random scenes end near their targets (worst: {away_seed})"),
             worst.away,
-            18.0,
+            1.0,
             "mm RMS",
         ),
         CaseResult::new(

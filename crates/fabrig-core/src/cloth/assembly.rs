@@ -1,0 +1,148 @@
+//! From patches to groups: who shares a register, and who is paired with whom.
+
+use std::collections::BTreeMap;
+
+use super::group::{Group, GroupPairs, Partner, PatchGroup};
+use super::input::{ClothAttachment, ClothOptions, ClothPatch, Precision};
+use super::lanes::{F32x8, F64x8, Real};
+
+/// Where a patch is, and what its input must look like.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PatchLayout {
+    pub(crate) node_count: usize,
+    pub(crate) anchor_count: usize,
+    pub(super) group: usize,
+    pub(super) lane: usize,
+}
+
+/// Groups, the place of every patch in them, and whether there are pairs.
+pub(super) struct Assembly {
+    pub(super) groups: Vec<Box<dyn PatchGroup>>,
+    pub(super) layout: Vec<PatchLayout>,
+    pub(super) has_pairs: bool,
+}
+
+/// Groups of `patches`, linked by their pairs.
+pub(super) fn assemble(patches: &[ClothPatch], options: &ClothOptions) -> Assembly {
+    let mut groups: Vec<Box<dyn PatchGroup>> = Vec::new();
+    let mut layout: Vec<PatchLayout> = patches
+        .iter()
+        .map(|p| PatchLayout {
+            node_count: p.shape.node_count(),
+            anchor_count: p.anchor_sets().map(|(nodes, _)| nodes.len()).sum(),
+            group: 0,
+            lane: 0,
+        })
+        .collect();
+    for members in plan_groups(patches, options.precision) {
+        for (lane, &patch) in members.iter().enumerate() {
+            layout[patch].group = groups.len();
+            layout[patch].lane = lane;
+        }
+        groups.push(make_group(patches, &members, options));
+    }
+    let has_pairs = link_pairs(patches, &layout, &mut groups);
+    Assembly {
+        groups,
+        layout,
+        has_pairs,
+    }
+}
+
+/// Patches of one shape, with or without pressure, in chunks that fit into lanes.
+fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> {
+    let widest = match precision {
+        Precision::Single => F32x8::LANES,
+        Precision::Double => F64x8::LANES,
+        Precision::SingleScalar => 1,
+    };
+    let mut alike: BTreeMap<(u32, u32, bool, bool), Vec<usize>> = BTreeMap::new();
+    for (index, p) in patches.iter().enumerate() {
+        let key = (
+            p.shape.u_count,
+            p.shape.v_count,
+            p.shape.is_periodic,
+            p.material.pressure > 0.0,
+        );
+        alike.entry(key).or_default().push(index);
+    }
+    alike
+        .into_values()
+        .flat_map(|members| {
+            members
+                .chunks(widest)
+                .map(<[usize]>::to_vec)
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+fn make_group(
+    patches: &[ClothPatch],
+    members: &[usize],
+    options: &ClothOptions,
+) -> Box<dyn PatchGroup> {
+    match options.precision {
+        Precision::Double => Box::new(Group::<F64x8>::new(patches, members, options)),
+        Precision::SingleScalar => Box::new(Group::<f32>::new(patches, members, options)),
+        Precision::Single => Box::new(Group::<F32x8>::new(patches, members, options)),
+    }
+}
+
+/// Gives every group the pairs of its nodes. Returns whether there are any.
+fn link_pairs(
+    patches: &[ClothPatch],
+    layout: &[PatchLayout],
+    groups: &mut [Box<dyn PatchGroup>],
+) -> bool {
+    /// A node of a pair: group, node, lane. Ports are in this order, that of memory.
+    type End = (usize, u32, u32);
+    let end = |patch: usize, node: u32| -> End {
+        let at = &layout[patch];
+        (at.group, node, at.lane as u32)
+    };
+    let mut pairs: Vec<(End, End, f64)> = Vec::new();
+    for (a, patch) in patches.iter().enumerate() {
+        for attachment in &patch.attachments {
+            let ClothAttachment::Patch {
+                patch: b,
+                pairs: nodes,
+                strength,
+            } = attachment
+            else {
+                continue;
+            };
+            let b = *b as usize;
+            let stiffness = |p: usize| patches[p].material.stretch_stiffness();
+            let stiffness = strength * stiffness(a).min(stiffness(b));
+            for &(node, other) in nodes {
+                pairs.push((end(a, node), end(b, other), stiffness));
+            }
+        }
+    }
+    let mut ports: BTreeMap<End, usize> = BTreeMap::new();
+    for &(a, b, _) in &pairs {
+        ports.insert(a, 0);
+        ports.insert(b, 0);
+    }
+    let mut lists = vec![GroupPairs::default(); groups.len()];
+    for (&(group, node, lane), port) in &mut ports {
+        let list = &mut lists[group];
+        *port = list.nodes.len();
+        list.nodes.push((node, lane));
+        list.partners.push(Vec::new());
+    }
+    for &(a, b, stiffness) in &pairs {
+        for (own, other) in [(a, b), (b, a)] {
+            lists[own.0].partners[ports[&own]].push(Partner {
+                group: other.0,
+                port: ports[&other],
+                stiffness,
+            });
+        }
+    }
+    for (index, (group, list)) in groups.iter_mut().zip(lists).enumerate() {
+        group.set_pairs(index, list);
+    }
+    !pairs.is_empty()
+}
