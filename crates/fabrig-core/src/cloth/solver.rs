@@ -10,7 +10,7 @@ use super::guard::Guard;
 use super::hook::SubstepHook;
 use super::hooked::{SeenNodes, advance_hooked};
 use super::input::{ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion};
-use super::report::{Counters, Energies, StepReport};
+use super::report::{Energies, StepReport};
 use super::validate;
 
 /// Substeps of a long frame are at most this many times those of 1/60 s.

@@ -6,7 +6,7 @@ use crate::cloth::constraints::pressure::swept_volume;
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
 use crate::cloth::input::PatchMotion;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::cloth::lanes::Real;
 
 impl<R: Real> Group<R> {
     /// Patch of a lane; lanes to spare repeat the last one.
