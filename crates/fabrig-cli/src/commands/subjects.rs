@@ -44,7 +44,15 @@ fn poses(shapes: &[String], args: &RenderArgs) -> Result<Vec<(String, Vec<f32>)>
             .map(|shape| {
                 let mut weights = vec![0.0; shapes.len()];
                 weights[shape] = 1.0;
-                (shapes[shape].clone(), weights)
+                // The corrective of an open jaw is nothing to look at without one.
+                let jaw = shapes.iter().position(|name| name == "jawOpen");
+                match jaw.filter(|_| shapes[shape] == "mouthClose") {
+                    Some(jaw) => {
+                        weights[jaw] = 1.0;
+                        ("mouthClose, jawOpen".to_owned(), weights)
+                    }
+                    None => (shapes[shape].clone(), weights),
+                }
             })
             .collect())
     } else if args.pose.is_empty() {
