@@ -11,9 +11,10 @@ mod faces;
 
 use std::sync::Arc;
 
-use fabrig_core::Vector;
+use fabrig_core::mesh::Surface;
 use fabrig_core::scene::{Scene, Simulation};
 use fabrig_core::template::{self, RigidBody};
+use fabrig_core::{Point, Vector};
 use faces::RiggedFace;
 
 /// A face in one pose.
@@ -102,43 +103,48 @@ impl Posed {
 
     /// Largest share of the aperture of an eye that is open now, over all columns between its
     /// corners where it is open by 2 mm or more at rest, and how many columns these are.
+    ///
+    /// Open is what an onlooker straight ahead sees of the inside: rays towards the face that
+    /// meet eyeball, socket or nothing before they meet skin.
     fn open_share(&self, side: &str) -> (f64, usize) {
-        let template = template::human();
-        let corner = |name: &str| self.rest[vertex(self.face, &format!("{name}_{side}"))].x;
-        let (a, b) = (corner("eye_inner"), corner("eye_outer"));
-        let columns: Vec<f32> = {
-            let count = ((b - a).abs() * 2.0) as usize;
-            (1..count)
-                .map(|k| a + (b - a) * k as f32 / count as f32)
-                .collect()
+        const COLUMN: f64 = 0.5;
+        const STEP: f64 = 0.05;
+        let place = |p: &[nalgebra::Point3<f32>], name: &str| {
+            let p = p[vertex(self.face, &format!("{name}_{side}"))];
+            Point::from(p.coords.cast())
         };
-        let heights = |lid: &str, sign: f32, p: &[nalgebra::Point3<f32>]| -> Vec<f32> {
-            let region = template.regions.find(&format!("{lid}_{side}")).unwrap();
-            let is_lid = |v: u32| {
-                self.face.registration.face_regions[v as usize] == region && !self.face.is_part(v)
-            };
-            let mut lowest = vec![f32::INFINITY; columns.len()];
-            for t in self.face.mesh.triangles() {
-                for k in 0..3 {
-                    let (i, j) = (t[k], t[(k + 1) % 3]);
-                    if !is_lid(i) || !is_lid(j) {
-                        continue;
-                    }
-                    let (i, j) = (p[i as usize], p[j as usize]);
-                    for (column, lowest) in columns.iter().zip(&mut lowest) {
-                        let t = (column - i.x) / (j.x - i.x);
-                        if (0.0..=1.0).contains(&t) {
-                            *lowest = lowest.min(sign * (i.y + t * (j.y - i.y)));
-                        }
-                    }
-                }
-            }
-            lowest.iter().map(|h| sign * h).collect()
+        let (a, b) = (
+            place(&self.rest, "eye_inner"),
+            place(&self.rest, "eye_outer"),
+        );
+        let upper = place(&self.rest, "upper_lid_mid").y + 4.0;
+        let lower = place(&self.rest, "lower_lid_mid").y - 4.0;
+        let socket = template::human().regions.find(&format!("socket_{side}"));
+        let is_inside = |v: u32| {
+            self.face.is_part(v) || Some(self.face.registration.face_regions[v as usize]) == socket
         };
+        let triangles = self.face.mesh.triangles();
+        let inside: Vec<bool> = triangles
+            .iter()
+            .map(|t| t.iter().any(|&v| is_inside(v)))
+            .collect();
+        let columns = ((b.x - a.x).abs() / COLUMN) as usize;
         let apertures = |p: &[nalgebra::Point3<f32>]| -> Vec<f64> {
-            let (upper, lower) = (heights("upper_lid", 1.0, p), heights("lower_lid", -1.0, p));
-            let pairs = upper.iter().zip(&lower);
-            pairs.map(|(u, l)| f64::from(u - l)).collect()
+            let points: Vec<Point> = p.iter().map(|p| Point::from(p.coords.cast())).collect();
+            let surface = Surface::new(&points, &triangles).unwrap();
+            let front = a.z.max(b.z) + 60.0;
+            let is_open = |x: f64, y: f64| {
+                let hit = surface.cast_ray(&Point::new(x, y, front), &-Vector::z(), 90.0);
+                hit.is_none_or(|hit| inside[hit.triangle as usize])
+            };
+            (1..columns)
+                .map(|k| a.x + (b.x - a.x) * k as f64 / columns as f64)
+                .map(|x| {
+                    let rows = ((upper - lower) / STEP) as usize;
+                    let open = (0..rows).filter(|r| is_open(x, lower + *r as f64 * STEP));
+                    open.count() as f64 * STEP
+                })
+                .collect()
         };
         let (now, rest) = (apertures(&self.now), apertures(&self.rest));
         let open = now.iter().zip(&rest).filter(|(_, r)| **r >= 2.0);
@@ -220,9 +226,6 @@ impl Claims {
     }
 }
 
-/// Blinks that leave more than 15 % of the aperture open somewhere along the lids, at most a
-/// column by a corner: (face, shape, share left).
-const KNOWN_OPEN: [(&str, &str, f64); 1] = [("ict_neutral", "eyeBlinkLeft", 0.4)];
 /// Share of the template's own motion that a face of like size has at least.
 const OWN_SHARE: f64 = 0.7;
 /// (suffix of shapes, suffix of landmarks, direction of this side along x)
@@ -253,13 +256,10 @@ fn eyes_and_brows_of(face: &'static RiggedFace) {
             columns as f64,
             20.0,
         );
-        let known = KNOWN_OPEN
-            .iter()
-            .find(|k| (k.0, k.1) == (face.name, &*name));
         claims.less(
             format!("{name} closes the aperture along the lids, share left"),
             share,
-            known.map_or(0.15, |k| k.2),
+            0.15,
         );
         let (name, p) = shape("eyeWide");
         let (now, rest) = p.distances(&upper, &lower);
