@@ -1,5 +1,6 @@
 //! The command line as types.
 
+use fabrig_core::transfer::{AlphaMode, OffsetMode};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -102,6 +103,22 @@ pub(crate) struct RigArgs {
     /// Cut lips or lids apart that are one fused surface; what is new follows the mesh's vertices
     #[arg(long, value_enum, value_name = "OPENING", value_delimiter = ',')]
     pub(crate) cut_seams: Vec<Seam>,
+    /// The face's own expressions, to fit the muscles' amplitudes to: a folder of meshes in the
+    /// face's vertex order, named as ARKit's shapes
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) shapes: Option<PathBuf>,
+    /// What is made of them: amplitudes are fitted, or more
+    #[arg(
+        long,
+        value_enum,
+        value_name = "MODE",
+        default_value = "shape",
+        requires = "shapes"
+    )]
+    pub(crate) alpha: Alpha,
+    /// How the template's displacements are put on the face [default: the best on other faces]
+    #[arg(long, value_enum, value_name = "MODE")]
+    pub(crate) offsets: Option<Offsets>,
     /// Also write the mesh that the rig moves: the face with its cuts, in its own units
     #[arg(long, value_name = "OUT.obj")]
     pub(crate) skin: Option<PathBuf>,
@@ -114,6 +131,51 @@ pub(crate) struct RigArgs {
     /// Print the report as JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// How many amplitudes there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Alpha {
+    /// One a patch
+    Patch,
+    /// One a patch and shape
+    Shape,
+    /// Which way too: a linear map, smooth over the skin
+    Map,
+    /// They are taken as they are, and shapes that are missing are mapped
+    Own,
+}
+
+impl From<Alpha> for AlphaMode {
+    fn from(alpha: Alpha) -> Self {
+        match alpha {
+            Alpha::Patch => Self::Patch,
+            Alpha::Shape => Self::PatchAndShape,
+            Alpha::Map => Self::Map,
+            Alpha::Own => Self::Own,
+        }
+    }
+}
+
+/// How displacements are put on a face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Offsets {
+    /// As they are, times the size of each patch
+    Global,
+    /// Turned and stretched with the skin around
+    Frame,
+    /// Deformation transfer: by what a shape does to every triangle
+    Transfer,
+}
+
+impl From<Offsets> for OffsetMode {
+    fn from(offsets: Offsets) -> Self {
+        match offsets {
+            Offsets::Global => Self::Global,
+            Offsets::Frame => Self::Frame,
+            Offsets::Transfer => Self::DeformationTransfer,
+        }
+    }
 }
 
 /// What wrote a take.
@@ -460,6 +522,22 @@ pub(crate) enum BenchCommand {
     Runtime(BenchRuntimeArgs),
     /// The cloth solver's hard cases, each with its worst figure
     Stability(BenchStabilityArgs),
+    /// How near rigs come to faces' own expressions, beside whole-face delta transfer
+    Table3(BenchTable3Args),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchTable3Args {
+    /// Folders with a neutral mesh (`neutral.obj`) and shapes named as ARKit's, instead of the
+    /// bundled synthetic faces
+    #[arg(value_name = "FOLDER")]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Only bundled faces whose name has this in it
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub(crate) filter: String,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -24,6 +24,10 @@ pub enum Error {
     #[error(transparent)]
     Rig(#[from] crate::rig::RigError),
     #[error(transparent)]
+    OwnShapes(#[from] crate::pipeline::OwnShapesError),
+    #[error(transparent)]
+    Evaluation(#[from] crate::evaluation::Table3Error),
+    #[error(transparent)]
     Edit(#[from] crate::edit::EditError),
     #[error(transparent)]
     Facs(#[from] crate::facs::FacsError),

@@ -24,6 +24,7 @@ pub mod cloth;
 pub mod collision;
 pub mod edit;
 mod error;
+pub mod evaluation;
 pub mod facs;
 pub mod mesh;
 pub mod motion;

@@ -34,6 +34,7 @@ fn person_rig(name: &str) -> Arc<Rig> {
         positions: &person.positions,
         places: &places,
         rigid: &[],
+        examples: &[],
         report: String::new(),
     };
     Arc::new(build(&on_template, template, &RigOptions::default()).unwrap())

@@ -89,9 +89,11 @@ pub(crate) fn to_py(error: impl Into<Error>) -> PyErr {
         Error::Mesh(_) | Error::MeshIo(_) => MeshError::new_err(message),
         Error::Template(_) => TemplateError::new_err(message),
         Error::Registration(_) => RegistrationError::new_err(message),
-        Error::Rig(_) | Error::Anatomy(_) | Error::Transfer(_) | Error::Skin(_) => {
-            RigError::new_err(message)
-        }
+        Error::Rig(_)
+        | Error::Edit(_)
+        | Error::Anatomy(_)
+        | Error::Transfer(_)
+        | Error::Skin(_) => RigError::new_err(message),
         Error::Motion(_) | Error::Facs(_) => MotionError::new_err(message),
         Error::Scene(_) | Error::Cloth(_) => SceneError::new_err(message),
         Error::Recording(_) => RecordingError::new_err(message),

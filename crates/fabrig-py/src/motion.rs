@@ -1,8 +1,9 @@
 //! Takes.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fabrig_core::motion::{self, Clip, MotionError, ReadOptions};
+use fabrig_core::motion::{self, Adjustment, Clip, MotionError, ReadOptions, TakeFormat};
 use fabrig_core::template;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -10,6 +11,7 @@ use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::errors::{input, to_py};
+use crate::pipeline::one_of;
 
 /// Weights of named shapes over time.
 #[pyclass(frozen, name = "Clip", module = "fabrig")]
@@ -91,6 +93,22 @@ impl PyClip {
         self.inner.sample(time).weights.into_pyarray(py)
     }
 
+    /// The clip at even times, `rate` frames per second.
+    fn resampled(&self, rate: f64) -> PyResult<Self> {
+        let inner = self.inner.resampled(rate).map_err(|source| {
+            to_py(MotionError::Clip {
+                name: "Clip".to_owned(),
+                source,
+            })
+        })?;
+        Ok(Self { inner })
+    }
+
+    /// The clip as CSV that `read_motion` reads.
+    fn to_csv(&self) -> String {
+        self.inner.to_csv()
+    }
+
     fn __len__(&self) -> usize {
         self.inner.frame_count()
     }
@@ -105,20 +123,56 @@ impl PyClip {
     }
 }
 
-/// Reads a take: Live Link Face or ARKit CSV, or keyed text.
+/// Names of formats, as on the command line.
+const FORMATS: [(&str, TakeFormat); 6] = [
+    ("keys", TakeFormat::Keys),
+    ("arkit", TakeFormat::Arkit),
+    ("open-face", TakeFormat::OpenFace),
+    ("py-feat", TakeFormat::PyFeat),
+    ("face-cap", TakeFormat::FaceCap),
+    ("media-pipe", TakeFormat::MediaPipe),
+];
+
+/// Reads a take: ARKit, OpenFace, py-feat or MediaPipe CSV, MediaPipe JSON, Face Cap text or
+/// keyed text, told apart by content unless `format` says it.
+///
+/// `calibrate_neutral` is a stretch (from, to) in seconds in which the performer rests,
+/// `gains` maps shapes to factors.
 #[pyfunction]
-#[pyo3(signature = (path, *, frame_rate=None, ignore_unknown_columns=false, clamp_weights=false))]
+#[pyo3(signature = (
+    path, *, format=None, frame_rate=None, ignore_unknown_columns=false, clamp_weights=false,
+    calibrate_neutral=None, gains=None, swap_sides=false
+))]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "Python's keyword arguments are the options"
+)]
 pub(crate) fn read_motion(
     py: Python<'_>,
     path: PathBuf,
+    format: Option<&str>,
     frame_rate: Option<f64>,
     ignore_unknown_columns: bool,
     clamp_weights: bool,
+    calibrate_neutral: Option<(f64, f64)>,
+    gains: Option<BTreeMap<String, f64>>,
+    swap_sides: bool,
 ) -> PyResult<PyClip> {
+    let format = match format {
+        Some(name) => Some(one_of("format", name, &FORMATS)?),
+        None => None,
+    };
     let options = ReadOptions {
+        format,
         frame_rate,
         ignore_unknown_columns,
         clamp_weights,
+        adjust: Adjustment {
+            swap_sides,
+            neutral: calibrate_neutral.map(|(from, to)| [from, to]),
+            gains: gains.unwrap_or_default().into_iter().collect(),
+            ..Adjustment::default()
+        },
         ..ReadOptions::default()
     };
     let inner = py.detach(|| motion::read(path, &options)).map_err(to_py)?;

@@ -5,9 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fabrig_core::Point;
+use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, rig_face};
+use fabrig_core::rig::Expression;
 use fabrig_core::template;
+use fabrig_core::transfer::{AlphaMode, OffsetMode};
 use pyo3::prelude::*;
 
 use crate::arrays;
@@ -24,11 +27,18 @@ use crate::simulation::scene;
 /// - `unit_mm`: millimetres per unit, where it is known
 /// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
 ///   vertices follow those given
+/// - `expressions`: shape -> vertices (N, 3) of this very face, in ARKit's names, to fit the
+///   muscles to; `alpha` says how: one amplitude a "patch", or a patch and "shape", a linear
+///   "map", or their "own" shapes as they are
+/// - `offsets`: how the template's displacements are put on the face, "global", "frame" or
+///   "transfer" (deformation transfer)
 /// - `progress`: called with (stage, share)
 #[pyfunction]
 #[pyo3(signature = (
-    vertices, faces, *, landmarks=None, unit_mm=None, cut_seams=None, progress=None
+    vertices, faces, *, landmarks=None, unit_mm=None, cut_seams=None, expressions=None,
+    alpha="own", offsets="global", progress=None
 ))]
+#[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
@@ -36,6 +46,9 @@ pub(crate) fn rig(
     landmarks: Option<BTreeMap<String, [f64; 3]>>,
     unit_mm: Option<f64>,
     cut_seams: Option<Vec<String>>,
+    expressions: Option<BTreeMap<String, Bound<'_, PyAny>>>,
+    alpha: &str,
+    offsets: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
     let positions = arrays::points("vertices", vertices)?;
@@ -59,6 +72,11 @@ pub(crate) fn rig(
         .into_iter()
         .map(|(name, place)| (name, Point::from(place)))
         .collect();
+    options.rig.alpha = one_of("alpha", alpha, &ALPHA_MODES)?;
+    options.rig.offsets = one_of("offsets", offsets, &OFFSET_MODES)?;
+    for (name, vertices) in expressions.unwrap_or_default() {
+        options.expressions.push(expression(name, &vertices)?);
+    }
     let mut progress = Progress::new(progress);
     let rigged = py.detach(|| {
         rig_face(&face, template::human(), &options, &mut |step| {
@@ -69,6 +87,61 @@ pub(crate) fn rig(
     progress.finish()?;
     Ok(PyRig {
         inner: Arc::new(rigged.map_err(to_py)?.rig),
+    })
+}
+
+const ALPHA_MODES: [(&str, AlphaMode); 4] = [
+    ("patch", AlphaMode::Patch),
+    ("shape", AlphaMode::PatchAndShape),
+    ("map", AlphaMode::Map),
+    ("own", AlphaMode::Own),
+];
+
+const OFFSET_MODES: [(&str, OffsetMode); 3] = [
+    ("global", OffsetMode::Global),
+    ("frame", OffsetMode::Frame),
+    ("transfer", OffsetMode::DeformationTransfer),
+];
+
+/// The value that a name stands for.
+pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
+    known
+        .iter()
+        .find(|(other, _)| *other == name)
+        .map(|(_, value)| *value)
+        .ok_or_else(|| {
+            let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+            input(format!(
+                "{argument}: '{name}' is not one of {}",
+                names.join(", ")
+            ))
+        })
+}
+
+/// One of the face's own shapes, by its name.
+fn expression(name: String, vertices: &Bound<'_, PyAny>) -> PyResult<Expression> {
+    let shapes = &template::human().shapes;
+    let mut weights = vec![0.0; shapes.len()];
+    let names = match match_shape(&name) {
+        Some(ShapeMatch::One(shape)) => vec![ARKIT_SHAPES[shape]],
+        Some(ShapeMatch::Both(left, right)) => vec![ARKIT_SHAPES[left], ARKIT_SHAPES[right]],
+        None => Vec::new(),
+    };
+    for (shape, weight) in shapes.iter().zip(&mut weights) {
+        if names.contains(&shape.name.as_str()) {
+            *weight = 1.0;
+        }
+    }
+    if names.is_empty() {
+        let nearest = nearest_name(&name, ARKIT_SHAPES).unwrap_or_default();
+        return Err(input(format!(
+            "expressions: '{name}' is no shape of ARKit (nearest: '{nearest}')"
+        )));
+    }
+    Ok(Expression {
+        positions: arrays::points(&format!("expressions['{name}']"), vertices)?,
+        name,
+        weights,
     })
 }
 

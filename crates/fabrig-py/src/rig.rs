@@ -1,8 +1,10 @@
 //! Rigs.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use fabrig_core::edit::{Edits, load_edited_rig};
 use fabrig_core::rig::Rig;
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -19,12 +21,34 @@ pub(crate) struct PyRig {
 
 #[pymethods]
 impl PyRig {
-    /// Loads a rig file.
+    /// Loads a rig file, with the edits that stand beside it (`face.edits.toml`) unless
+    /// `edits` is false.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let inner = py.detach(|| Rig::load(path)).map_err(to_py)?;
+    #[pyo3(signature = (path, *, edits=true))]
+    fn load(py: Python<'_>, path: PathBuf, edits: bool) -> PyResult<Self> {
+        let inner = py
+            .detach(|| {
+                if edits {
+                    load_edited_rig(path)
+                } else {
+                    Ok(Rig::load(path)?)
+                }
+            })
+            .map_err(to_py)?;
         Ok(Self {
             inner: Arc::new(inner),
+        })
+    }
+
+    /// The rig with the edits of a file (`face.edits.toml`); this one stays as it is.
+    fn with_edits(&self, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let edited = py.detach(|| {
+            let mut rig = Rig::clone(&self.inner);
+            Edits::load(path)?.apply(&mut rig)?;
+            Ok::<_, fabrig_core::edit::EditError>(rig)
+        });
+        Ok(Self {
+            inner: Arc::new(edited.map_err(to_py)?),
         })
     }
 
@@ -58,6 +82,15 @@ impl PyRig {
     fn patch_names(&self) -> Vec<String> {
         let patches = self.inner.patches.iter();
         patches.map(|p| p.patch.chart.name.clone()).collect()
+    }
+
+    /// Amplitude of each patch against the template's, alpha of Eq. 3, by name.
+    #[getter]
+    fn alphas(&self) -> BTreeMap<String, f64> {
+        let patches = self.inner.patches.iter();
+        patches
+            .map(|p| (p.patch.chart.name.clone(), p.transfer.alpha))
+            .collect()
     }
 
     /// Nodes of all patches.

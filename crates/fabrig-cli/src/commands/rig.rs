@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::{read_mesh, write_obj};
-use fabrig_core::pipeline::{RigFaceOptions, RiggedFace, rig_face};
+use fabrig_core::pipeline::{OwnShapes, RigFaceOptions, RiggedFace, read_own_shapes, rig_face};
 use fabrig_core::registration::{CutSeams, DistanceStatistics, LandmarkOrder, read_landmarks};
 use fabrig_core::template;
 
@@ -33,6 +33,17 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         eyes: args.cut_seams.contains(&Seam::Eyes),
     };
     let face = read_mesh(&args.face)?;
+    if let Some(offsets) = args.offsets {
+        options.rig.offsets = offsets.into();
+    }
+    options.rig.alpha = args.alpha.into();
+    let own = match &args.shapes {
+        Some(folder) => Some(read_own_shapes(folder, &face, template::human())?),
+        None => None,
+    };
+    if let Some(own) = &own {
+        options.expressions.clone_from(&own.expressions);
+    }
     let rigged = rig(console, &face, &options)
         .with_context(|| format!("{} was not rigged", args.face.display()))?;
     rigged.rig.save(&args.output)?;
@@ -49,6 +60,9 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         console.result(&serde_json::to_string_pretty(&rigged.report)?);
     } else {
         print_report(console, &rigged);
+        if let Some(own) = &own {
+            print_own_shapes(console, own, &rigged);
+        }
         console.result(&format!("{:<20}{}", "rig", args.output.display()));
     }
     Ok(Outcome::Done)
@@ -61,6 +75,35 @@ pub(super) fn rig(console: &Console, face: &Mesh, options: &RigFaceOptions) -> R
     });
     console.clear();
     Ok(rigged?)
+}
+
+/// What the face's own expressions were good for.
+fn print_own_shapes(console: &Console, own: &OwnShapes, rigged: &RiggedFace) {
+    let mut alphas: Vec<f64> = rigged
+        .rig
+        .patches
+        .iter()
+        .map(|patch| patch.transfer.alpha)
+        .collect();
+    alphas.sort_by(f64::total_cmp);
+    let open = rigged.rig.jaw.hinge.open_angle / template::human().jaw.open_angle;
+    console.result(&format!(
+        "{:<20}{}, amplitudes of the patches {:.2} to {:.2}, median {:.2}; the jaw opens {:.2} times \
+         as far",
+        "own shapes",
+        own.expressions.len(),
+        alphas.first().unwrap_or(&1.0),
+        alphas.last().unwrap_or(&1.0),
+        alphas.get(alphas.len() / 2).unwrap_or(&1.0),
+        open,
+    ));
+    for (path, reason) in &own.skipped {
+        console.result(&format!(
+            "{:<20}{} passed over: {reason}",
+            "note",
+            path.display()
+        ));
+    }
 }
 
 /// What registration measured, for people.

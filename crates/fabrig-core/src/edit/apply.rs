@@ -1,6 +1,9 @@
 //! Edits on a rig.
 
+use std::path::Path;
+
 use super::{EditError, Edits, MaterialEdit, PatchEdit, ShapeEdit};
+use crate::Error;
 use crate::cloth::Materials;
 use crate::facs::nearest_name;
 use crate::rig::Rig;
@@ -27,6 +30,20 @@ impl Edits {
         *rig = edited;
         Ok(())
     }
+}
+
+/// Loads a rig with the edits that stand beside it, if any do.
+///
+/// # Errors
+///
+/// [`Error::Rig`] and [`Error::Edit`].
+pub fn load_edited_rig(path: impl AsRef<Path>) -> Result<Rig, Error> {
+    let path = path.as_ref();
+    let mut rig = Rig::load(path)?;
+    if let Some(edits) = Edits::beside(path)? {
+        edits.apply(&mut rig)?;
+    }
+    Ok(rig)
 }
 
 /// Patch and place of a muscle shape by its name.

@@ -31,6 +31,7 @@ mod error;
 mod file;
 mod muscle_mesh;
 
+pub use apply::load_edited_rig;
 pub use error::EditError;
 pub use file::{Edits, MaterialEdit, PatchEdit, ShapeEdit, edits_path};
 pub use muscle_mesh::{export_muscle_shape, import_muscle_shape, muscle_shape_names};

@@ -21,11 +21,13 @@
 
 mod animate;
 mod cost;
+mod own_shapes;
 mod rig_face;
 mod strain;
 mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
 pub use cost::{CostRow, cost};
+pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_folder, read_own_shapes};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use timing::TimeStatistics;

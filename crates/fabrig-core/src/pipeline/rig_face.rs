@@ -8,7 +8,7 @@ use crate::mesh::{Mesh, VertexOrigin};
 use crate::registration::{
     CutSeams, Progress, RegistrationOptions, RegistrationReport, StageTime, cut_seams, register,
 };
-use crate::rig::{FaceOnTemplate, Rig, RigOptions, build};
+use crate::rig::{Expression, FaceOnTemplate, Rig, RigOptions, build, carry_expressions};
 use crate::template::Template;
 
 /// How a face is rigged.
@@ -20,6 +20,8 @@ pub struct RigFaceOptions {
     pub cut_seams: CutSeams,
     /// How the rig is built on it.
     pub rig: RigOptions,
+    /// Expressions of this very face, to which amplitudes are fitted.
+    pub expressions: Vec<Expression>,
 }
 
 /// A face with its rig.
@@ -76,6 +78,7 @@ pub fn rig_face(
         return Err(crate::registration::RegistrationError::Cancelled { stage: "build" }.into());
     }
     let clock = Instant::now();
+    let examples = carry_expressions(face, &registration, template, &options.expressions)?;
     let mut registration = registration;
     let mut cut_mesh = None;
     let mut origins = None;
@@ -93,7 +96,8 @@ pub fn rig_face(
     let normalized = template
         .skin
         .with_positions(registration.positions.clone())?;
-    let on_template = FaceOnTemplate::from_registration(face, &registration)?;
+    let mut on_template = FaceOnTemplate::from_registration(face, &registration)?;
+    on_template.examples = &examples;
     let mut rig = build(&on_template, template, &options.rig)?;
     name_parts_by_groups(&mut rig);
     let mut report = registration.report;

@@ -50,3 +50,4 @@ pub use report::{
 };
 pub use similarity::MIN_LANDMARK_COUNT;
 pub(crate) use similarity::umeyama;
+pub(crate) use sparse::SpdSystem;

@@ -15,7 +15,7 @@ use faer::{Conj, MatMut, Par, Side, Spec};
 use super::RegistrationError;
 
 /// A symmetric positive definite matrix of fixed pattern (lower triangle, by columns).
-pub(super) struct SpdSystem {
+pub(crate) struct SpdSystem {
     size: usize,
     column_starts: Vec<usize>,
     rows: Vec<usize>,
@@ -28,7 +28,7 @@ pub(super) struct SpdSystem {
 impl SpdSystem {
     /// The pattern: pairs (i, j) in any order, any triangle, repeated or not. The diagonal is
     /// always in it.
-    pub(super) fn new(size: usize, pairs: &[(u32, u32)]) -> Result<Self, RegistrationError> {
+    pub(crate) fn new(size: usize, pairs: &[(u32, u32)]) -> Result<Self, RegistrationError> {
         let mut entries: Vec<(u32, u32)> = pairs
             .iter()
             .map(|&(i, j)| (i.min(j), i.max(j)))
@@ -83,7 +83,7 @@ impl SpdSystem {
     }
 
     /// Adds to the entry (i, j), which must be in the pattern; the entry (j, i) follows.
-    pub(super) fn add(&mut self, i: u32, j: u32, value: f64) {
+    pub(crate) fn add(&mut self, i: u32, j: u32, value: f64) {
         let (column, row) = (i.min(j) as usize, i.max(j) as usize);
         let range = self.column_starts[column]..self.column_starts[column + 1];
         if let Ok(k) = self.rows[range.clone()].binary_search(&row) {
@@ -95,7 +95,14 @@ impl SpdSystem {
 
     /// Factorizes and solves for three right-hand sides at once, in place; `rhs` is
     /// column-major, shape [3, size].
-    pub(super) fn solve(&mut self, rhs: &mut [f64]) -> Result<(), RegistrationError> {
+    pub(crate) fn solve(&mut self, rhs: &mut [f64]) -> Result<(), RegistrationError> {
+        self.factorize()?;
+        self.solve_factorized(rhs);
+        Ok(())
+    }
+
+    /// Factorizes the matrix as it stands, for [`Self::solve_factorized`].
+    pub(crate) fn factorize(&mut self) -> Result<(), RegistrationError> {
         let pattern = SymbolicSparseColMatRef::new_checked(
             self.size,
             self.size,
@@ -104,7 +111,6 @@ impl SpdSystem {
             &self.rows,
         );
         let matrix = SparseColMatRef::new(pattern, &self.values);
-        let stack = MemStack::new(&mut self.memory);
         self.symbolic
             .factorize_numeric_llt(
                 &mut self.factor,
@@ -112,20 +118,24 @@ impl SpdSystem {
                 Side::Lower,
                 LltRegularization::default(),
                 Par::Seq,
-                stack,
+                MemStack::new(&mut self.memory),
                 Spec::default(),
             )
+            .map(|_| ())
             .map_err(|_| RegistrationError::SystemNotSolvable {
                 unknowns: self.size,
-            })?;
+            })
+    }
+
+    /// Solves with the last factorization; `rhs` as for [`Self::solve`].
+    pub(crate) fn solve_factorized(&mut self, rhs: &mut [f64]) {
         let columns = MatMut::from_column_major_slice_mut(rhs, self.size, 3);
         LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
             Conj::No,
             columns,
             Par::Seq,
-            stack,
+            MemStack::new(&mut self.memory),
         );
-        Ok(())
     }
 }
 

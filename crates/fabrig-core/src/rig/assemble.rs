@@ -1,21 +1,19 @@
 //! From a face on the template to a rig.
 
-use crate::anatomy::{self, Patch, Resolution};
+use crate::Point;
+use crate::anatomy::{self, Resolution};
 use crate::mesh::{Mesh, SurfacePoint};
 use crate::registration::{Registration, RigidComponent};
 use crate::rig::close_lids::close_lids;
 use crate::rig::parts::name_parts;
+use crate::rig::put_on_face::{FaceSide, ShapesOnFace};
 use crate::rig::sockets::{fit_eyes, fit_hinge};
 use crate::rig::template_side::TemplateSide;
 use crate::rig::tongue::give_shapes;
 use crate::rig::{Rig, RigError, RigJaw, RigPatch};
 use crate::skin::{FitOptions, SkinBinding, SmoothInterpolation};
-use crate::template::{EyeSocket, Template};
-use crate::transfer::{
-    AlphaField, EyeShapes, JawField, JawMode, JawShapes, LidClosing, LidField, MuscleShape,
-    PatchTransfer, ShapeSampler, size_ratio,
-};
-use crate::{Point, Vector};
+use crate::template::{JawHinge, Template};
+use crate::transfer::{AlphaMode, Example, EyeShapes, JawMode, JawShapes, OffsetMode};
 use nalgebra::Similarity3;
 
 /// How a rig is built.
@@ -27,6 +25,10 @@ pub struct RigOptions {
     pub threshold: f64,
     /// How patches follow the jaw.
     pub jaw_mode: JawMode,
+    /// How displacements are put on a face.
+    pub offsets: OffsetMode,
+    /// What examples of the face's own expressions are fitted by.
+    pub alpha: AlphaMode,
     /// How skin weights are fitted.
     pub fit: FitOptions,
 }
@@ -37,6 +39,8 @@ impl Default for RigOptions {
             resolution: Resolution::default(),
             threshold: 0.05,
             jaw_mode: JawMode::default(),
+            offsets: OffsetMode::default(),
+            alpha: AlphaMode::default(),
             fit: FitOptions::default(),
         }
     }
@@ -55,6 +59,9 @@ pub struct FaceOnTemplate<'a> {
     pub places: &'a [SurfacePoint],
     /// Pieces of the mesh that are not skin.
     pub rigid: &'a [RigidComponent],
+    /// Expressions of this face, in the template's topology, to fit amplitudes to; none where
+    /// their size must do.
+    pub examples: &'a [Example],
     /// Report as JSON, kept with the rig.
     pub report: String,
 }
@@ -79,6 +86,7 @@ impl<'a> FaceOnTemplate<'a> {
             positions: &registration.positions,
             places: &registration.face_points,
             rigid: &registration.rigid_components,
+            examples: &[],
             report,
         })
     }
@@ -100,6 +108,7 @@ pub fn build(
         positions,
         places,
         rigid,
+        examples,
         ref report,
     } = *on_template;
     if positions.len() != template.skin.vertex_count() {
@@ -124,14 +133,24 @@ pub fn build(
     give_shapes(template, positions, &in_head, &mut parts);
 
     let jaw_shapes = JawShapes::of(template);
-    let transfers = transfer_all(
-        template,
-        &side.patches,
-        &patches,
-        positions,
-        side.shapes.clone(),
-        &eyes,
-    );
+    let put = ShapesOnFace::new(
+        FaceSide {
+            template,
+            template_patches: &side.patches,
+            patches: &patches,
+            positions,
+            hinge: &hinge,
+            eyes: &eyes,
+        },
+        &side.shapes,
+        options.offsets,
+        options.threshold,
+    )?;
+    let (transfers, open_angle) = put.fitted(examples, options.alpha)?;
+    let hinge = JawHinge {
+        open_angle,
+        ..hinge
+    };
     let is_rigid = rigid_mask(face.vertex_count(), &parts);
     let skin_places: Vec<Option<SurfacePoint>> = places
         .iter()
@@ -199,83 +218,6 @@ pub fn places_of_self(template: &Template) -> Vec<SurfacePoint> {
                 point: Point::origin(),
                 distance: f64::INFINITY,
             })
-        })
-        .collect()
-}
-
-/// Puts the muscle shapes of every patch on a face.
-pub(super) fn transfer_all(
-    template: &Template,
-    template_patches: &[Patch],
-    patches: &[Patch],
-    positions: &[Point],
-    shapes: Vec<Vec<MuscleShape>>,
-    eyes: &[EyeSocket; 2],
-) -> Vec<PatchTransfer> {
-    let jaw_shapes = JawShapes::of(template);
-    let closing = LidClosing::new(template, positions);
-    let sampler = ShapeSampler::new(template);
-    let sizes: Vec<f64> = template_patches
-        .iter()
-        .zip(patches)
-        .map(|(on_template, on_face)| {
-            let chart = &on_face.chart;
-            size_ratio(
-                chart.kind,
-                chart.grid,
-                &on_template.neutral,
-                &on_face.neutral,
-            )
-        })
-        .collect();
-    let field = AlphaField::new(template, patches, &sizes);
-    let corrections = closing.corrections(field.by_vertex());
-    template_patches
-        .iter()
-        .zip(patches)
-        .zip(shapes)
-        .zip(sizes)
-        .map(|(((on_template, on_face), mut shapes), alpha)| {
-            let chart = &on_face.chart;
-            let (from, to) = (&on_template.neutral, &on_face.neutral);
-            let alphas: Vec<f64> = chart.nodes.iter().map(|node| field.at(node)).collect();
-            let factors: Vec<f64> = alphas.iter().map(|a| a / alpha).collect();
-            let deltas = |shape: Option<u32>| {
-                let shape = shape?;
-                let found = shapes.iter().find(|s| s.shape == shape)?;
-                Some(found.deltas.as_slice())
-            };
-            let mut jaw = JawField::split(
-                &template.jaw,
-                from,
-                deltas(jaw_shapes.open),
-                deltas(jaw_shapes.close),
-            );
-            let lids = LidField::new(from, &template.eyes, to, eyes, &shapes, &alphas);
-            if let Some(jaw) = &mut jaw {
-                jaw.scale_residuals(&factors);
-            }
-            for shape in &mut shapes {
-                for (delta, factor) in shape.deltas.iter_mut().zip(&factors) {
-                    *delta *= *factor as f32;
-                }
-            }
-            for (shape, corrections) in &corrections {
-                let Some(muscle) = shapes.iter_mut().find(|s| s.shape == *shape) else {
-                    continue;
-                };
-                for (delta, node) in muscle.deltas.iter_mut().zip(&chart.nodes) {
-                    let correction: Vector = sampler.blend(node, corrections);
-                    *delta += (correction / alpha).cast::<f32>();
-                }
-            }
-            PatchTransfer {
-                alpha,
-                shapes,
-                jaw,
-                lids,
-                held: Vec::new(),
-            }
         })
         .collect()
 }

@@ -29,6 +29,9 @@ pub enum RigError {
     /// Shapes could not be transferred.
     #[error(transparent)]
     Transfer(#[from] TransferError),
+    /// The mesh has no surface to carry expressions from.
+    #[error(transparent)]
+    Surface(#[from] crate::mesh::SurfaceError),
     /// Skin could not be bound.
     #[error(transparent)]
     Skin(#[from] SkinError),

@@ -6,14 +6,17 @@
 mod assemble;
 mod close_lids;
 mod error;
+mod expressions;
 mod file;
 mod parts;
+mod put_on_face;
 mod sockets;
 mod template_side;
 mod tongue;
 
 pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self};
 pub use error::RigError;
+pub use expressions::{Expression, carry_expressions};
 pub use file::FORMAT_VERSION;
 pub use parts::RigPart;
 pub use template_side::{fit_template_weights, stored_template_weights, write_template_weights};

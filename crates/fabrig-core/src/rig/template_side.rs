@@ -12,13 +12,13 @@ use rayon::prelude::*;
 
 use crate::anatomy::{self, Patch, PatchChart};
 use crate::atomic_file::write_atomically;
-use crate::rig::assemble::transfer_all;
+use crate::rig::put_on_face::{FaceSide, ShapesOnFace};
 use crate::rig::{RigError, RigOptions};
 use crate::skin::{CandidateFinder, NodeAffine, NodeFrames, Pose, TemplateWeights, fit_to_shapes};
 use crate::template::{JawHinge, Template};
 use crate::transfer::{
-    JawMode, JawPose, JawShapes, MuscleShape, PatchTransfer, ShapeWeights, TransferContext,
-    muscle_shapes, smoothed_normals,
+    JawMode, JawPose, JawShapes, MuscleShape, OffsetMode, PatchTransfer, ShapeWeights,
+    TransferContext, muscle_shapes, smoothed_normals,
 };
 
 /// Changes whenever the fit gives other weights for the same data.
@@ -51,8 +51,10 @@ impl TemplateSide {
         let shapes = muscle_shapes(template, &charts, options.threshold)?;
         let stored =
             TemplateWeights::from_bytes(&template.skin_weights, template, &charts, fingerprint);
-        let weights =
-            stored.unwrap_or_else(|| fit_weights(template, &charts, &patches, &shapes, options));
+        let weights = match stored {
+            Some(weights) => weights,
+            None => fit_weights(template, &charts, &patches, &shapes, options)?,
+        };
         let side = Arc::new(Self {
             charts,
             patches,
@@ -80,7 +82,7 @@ pub fn fit_template_weights(
     let charts = anatomy::charts(template, options.resolution)?;
     let patches = anatomy::lay_patches(template, &charts, template.skin.positions())?;
     let shapes = muscle_shapes(template, &charts, options.threshold)?;
-    Ok(fit_weights(template, &charts, &patches, &shapes, options))
+    fit_weights(template, &charts, &patches, &shapes, options)
 }
 
 /// The weights that a pack brings for these options; `None` where it brings none, or such as
@@ -148,16 +150,22 @@ fn fit_weights(
     patches: &[Patch],
     shapes: &[Vec<MuscleShape>],
     options: &RigOptions,
-) -> TemplateWeights {
+) -> Result<TemplateWeights, RigError> {
     let rest = template.skin.positions();
-    let transfers = transfer_all(
-        template,
-        patches,
-        patches,
-        rest,
-        shapes.to_vec(),
-        &template.eyes,
-    );
+    let put = ShapesOnFace::new(
+        FaceSide {
+            template,
+            template_patches: patches,
+            patches,
+            positions: rest,
+            hinge: &template.jaw,
+            eyes: &template.eyes,
+        },
+        shapes,
+        OffsetMode::Global,
+        options.threshold,
+    )?;
+    let transfers = put.transfers(&put.even());
     let triangles = template.skin.triangles();
     let normals = smoothed_normals(rest, &triangles, 0);
     let finder = CandidateFinder::new(template, &triangles, &normals, patches, &options.fit);
@@ -178,7 +186,14 @@ fn fit_weights(
         .into_par_iter()
         .map(|s| poser.pose(s))
         .collect();
-    fit_to_shapes(template, charts, &normals, &finder, &poses, &options.fit)
+    Ok(fit_to_shapes(
+        template,
+        charts,
+        &normals,
+        &finder,
+        &poses,
+        &options.fit,
+    ))
 }
 
 struct TemplatePoser<'a> {

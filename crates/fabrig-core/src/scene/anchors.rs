@@ -173,6 +173,7 @@ mod tests {
             positions: template.skin.positions(),
             places: &places_of_self(template),
             rigid: &[],
+            examples: &[],
             report: String::new(),
         };
         let options = RigOptions {

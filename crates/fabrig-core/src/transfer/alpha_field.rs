@@ -26,15 +26,18 @@ pub struct AlphaField {
 impl AlphaField {
     /// Spreads the alpha of each patch over the skin around it.
     ///
-    /// - `patches` and `alphas`: one alpha for each patch, all of whose nodes lie on `template`
+    /// - `patches`: with the alpha of each; their nodes lie on `template`
     ///
     /// Where all alphas are equal to 1 so is the field, bit for bit.
-    pub fn new(template: &Template, patches: &[Patch], alphas: &[f64]) -> Self {
+    pub fn new<'a>(
+        template: &Template,
+        patches: impl IntoIterator<Item = (&'a Patch, f64)>,
+    ) -> Self {
         let triangles = template.skin.triangles();
         let count = template.skin.vertex_count();
         // What a vertex knows (difference from 1) and how firmly.
         let mut known = vec![(0.0, BACKGROUND); count];
-        for (patch, alpha) in patches.iter().zip(alphas) {
+        for (patch, alpha) in patches {
             for node in &patch.chart.nodes {
                 let corners = triangles[node.triangle as usize];
                 for (&v, weight) in corners.iter().zip(node.barycentric) {
@@ -99,13 +102,13 @@ mod tests {
         let template = human();
         let charts = anatomy::charts(template, Resolution::default()).unwrap();
         let patches = anatomy::lay_patches(template, &charts, template.skin.positions()).unwrap();
-        let even = AlphaField::new(template, &patches, &vec![1.0; patches.len()]);
+        let even = AlphaField::new(template, patches.iter().map(|p| (p, 1.0)));
         assert!(even.by_vertex().iter().all(|a| *a == 1.0));
 
         let alphas: Vec<f64> = (0..patches.len())
             .map(|p| 0.9 + 0.2 * (p % 2) as f64)
             .collect();
-        let field = AlphaField::new(template, &patches, &alphas);
+        let field = AlphaField::new(template, patches.iter().zip(alphas));
         assert!(field.by_vertex().iter().all(|a| (0.9..=1.1).contains(a)));
         let topology = Topology::from_mesh(&template.skin);
         for patch in &patches {

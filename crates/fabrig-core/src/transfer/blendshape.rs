@@ -48,9 +48,9 @@ pub fn smoothed_normals(positions: &[Point], triangles: &[[u32; 3]], rounds: usi
     normals
 }
 
-/// Samples whole-face shapes of one template anywhere at or under its skin.
+/// Samples displacements of a skin in the template's topology anywhere at or under it.
 pub struct ShapeSampler<'a> {
-    template: &'a Template,
+    rest: &'a [Point],
     triangles: Vec<[u32; 3]>,
     normals: Vec<Vector>,
 }
@@ -66,14 +66,17 @@ pub struct SampledShape {
 impl<'a> ShapeSampler<'a> {
     /// Prepares the template's neutral skin.
     pub fn new(template: &'a Template) -> Self {
+        Self::on(template, template.skin.positions())
+    }
+
+    /// Prepares the skin of a face in the template's topology.
+    ///
+    /// - `rest`: one position for each vertex of the template (mm)
+    pub fn on(template: &Template, rest: &'a [Point]) -> Self {
         let triangles = template.skin.triangles();
-        let normals = smoothed_normals(
-            template.skin.positions(),
-            &triangles,
-            NORMAL_SMOOTHING_ROUNDS,
-        );
+        let normals = smoothed_normals(rest, &triangles, NORMAL_SMOOTHING_ROUNDS);
         Self {
-            template,
+            rest,
             triangles,
             normals,
         }
@@ -86,12 +89,16 @@ impl<'a> ShapeSampler<'a> {
 
     /// Spreads one shape over all vertices, with the normals it makes.
     pub fn sample(&self, shape: &WholeFaceShape) -> SampledShape {
-        let rest = self.template.skin.positions();
-        let mut deltas = vec![Vector::zeros(); rest.len()];
+        let mut deltas = vec![Vector::zeros(); self.rest.len()];
         for &(vertex, delta) in &shape.deltas {
             deltas[vertex as usize] = delta;
         }
-        let moved: Vec<Point> = rest.iter().zip(&deltas).map(|(p, d)| p + d).collect();
+        self.sample_deltas(deltas)
+    }
+
+    /// The same for a displacement of every vertex. (mm)
+    pub fn sample_deltas(&self, deltas: Vec<Vector>) -> SampledShape {
+        let moved: Vec<Point> = self.rest.iter().zip(&deltas).map(|(p, d)| p + d).collect();
         let normals = smoothed_normals(&moved, &self.triangles, NORMAL_SMOOTHING_ROUNDS);
         let normal_deltas = normals
             .iter()
@@ -113,6 +120,12 @@ impl<'a> ShapeSampler<'a> {
             delta += weight * (shape.deltas[v] - node.depth * shape.normal_deltas[v]);
         }
         delta
+    }
+
+    /// Displacements of all nodes of a patch under a sampled shape. (mm)
+    pub fn patch_deltas(&self, shape: &SampledShape, chart: &PatchChart) -> Vec<Vector> {
+        let nodes = chart.nodes.iter();
+        nodes.map(|node| self.node_delta(shape, node)).collect()
     }
 
     /// Blends values given per skin vertex at the place of a node.
@@ -162,35 +175,71 @@ pub fn muscle_shapes(
 ) -> Result<Vec<Vec<MuscleShape>>, TransferError> {
     let sampler = ShapeSampler::new(template);
     sampler.check(charts)?;
-    let by_shape: Vec<Vec<Option<MuscleShape>>> = template
+    let sampled: Vec<SampledShape> = template
         .shapes
         .par_iter()
-        .enumerate()
-        .map(|(index, shape)| {
-            let sampled = sampler.sample(shape);
-            charts
-                .iter()
-                .map(|chart| {
-                    let deltas: Vec<Vector> = chart
-                        .nodes
-                        .iter()
-                        .map(|node| sampler.node_delta(&sampled, node))
-                        .collect();
-                    let moves = deltas.iter().any(|d| d.norm() >= threshold_mm);
-                    moves.then(|| MuscleShape {
-                        name: format!("{}.{}", chart.name, shape.name),
-                        shape: index as u32,
-                        deltas: deltas.iter().map(|d| d.cast::<f32>()).collect(),
-                    })
-                })
-                .collect()
-        })
+        .map(|shape| sampler.sample(shape))
         .collect();
-    let mut by_patch: Vec<Vec<MuscleShape>> = vec![Vec::new(); charts.len()];
-    for shapes in by_shape {
-        for (patch, shape) in by_patch.iter_mut().zip(shapes) {
-            patch.extend(shape);
-        }
-    }
-    Ok(by_patch)
+    Ok(on_patches(
+        template,
+        &sampler,
+        &sampled,
+        charts,
+        threshold_mm,
+    ))
+}
+
+/// As [`muscle_shapes`], of displacements that the template's shapes make on another face.
+///
+/// - `positions`: the face in the template's topology (mm)
+/// - `deltas`: of every vertex by each of the template's shapes (mm), as
+///   [`offsets_on_face`](super::offsets_on_face) gives them
+///
+/// # Errors
+///
+/// [`TransferError::NodeOutOfRange`] where a chart does not belong to this template.
+pub fn muscle_shapes_on_face(
+    template: &Template,
+    positions: &[Point],
+    deltas: &[Vec<Vector>],
+    charts: &[PatchChart],
+    threshold_mm: f64,
+) -> Result<Vec<Vec<MuscleShape>>, TransferError> {
+    let sampler = ShapeSampler::on(template, positions);
+    sampler.check(charts)?;
+    let sampled: Vec<SampledShape> = deltas
+        .par_iter()
+        .map(|deltas| sampler.sample_deltas(deltas.clone()))
+        .collect();
+    Ok(on_patches(
+        template,
+        &sampler,
+        &sampled,
+        charts,
+        threshold_mm,
+    ))
+}
+
+fn on_patches(
+    template: &Template,
+    sampler: &ShapeSampler<'_>,
+    sampled: &[SampledShape],
+    charts: &[PatchChart],
+    threshold_mm: f64,
+) -> Vec<Vec<MuscleShape>> {
+    let of_chart = |chart: &PatchChart| {
+        let shapes = template.shapes.iter().zip(sampled).enumerate();
+        shapes
+            .filter_map(|(index, (shape, sampled))| {
+                let deltas = sampler.patch_deltas(sampled, chart);
+                let moves = deltas.iter().any(|d| d.norm() >= threshold_mm);
+                moves.then(|| MuscleShape {
+                    name: format!("{}.{}", chart.name, shape.name),
+                    shape: index as u32,
+                    deltas: deltas.iter().map(|d| d.cast::<f32>()).collect(),
+                })
+            })
+            .collect()
+    };
+    charts.par_iter().map(of_chart).collect()
 }

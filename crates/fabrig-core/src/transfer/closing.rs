@@ -22,6 +22,7 @@ struct MarginPair {
 
 struct LidPair {
     shape: u32,
+    /// On the template.
     deltas: Vec<Vector>,
     pairs: Vec<MarginPair>,
     upper: Vec<bool>,
@@ -75,29 +76,28 @@ impl<'a> LidClosing<'a> {
         }
     }
 
-    /// What to add to `alpha * delta` of each blink so that the lids of this face meet.
+    /// What to add to the displacements of each blink so that the lids of this face meet.
     ///
-    /// - `alphas`: amplitude at each template vertex
+    /// - `on_face`: displacement of a template vertex by a shape on this face, amplitude
+    ///   included (mm)
     ///
     /// Returns (shape index, one correction per template vertex (mm)).
-    pub fn corrections(&self, alphas: &[f64]) -> Vec<(u32, Vec<Vector>)> {
+    pub fn corrections(&self, on_face: impl Fn(u32, usize) -> Vector) -> Vec<(u32, Vec<Vector>)> {
         self.eyes
             .iter()
-            .map(|eye| (eye.shape, self.correct(eye, alphas)))
+            .map(|eye| (eye.shape, self.correct(eye, |v| on_face(eye.shape, v))))
             .collect()
     }
 
-    fn correct(&self, eye: &LidPair, alphas: &[f64]) -> Vec<Vector> {
+    fn correct(&self, eye: &LidPair, on_face: impl Fn(usize) -> Vector) -> Vec<Vector> {
         let rest = self.template.skin.positions();
         let mut upper_marks = Vec::with_capacity(eye.pairs.len());
         let mut lower_marks = Vec::with_capacity(eye.pairs.len());
         for &MarginPair { upper, lower } in &eye.pairs {
             let (du, dl) = (eye.deltas[upper], eye.deltas[lower]);
-            let left_open = |at: &[Point], scale_upper: f64, scale_lower: f64| {
-                (at[upper] + scale_upper * du) - (at[lower] + scale_lower * dl)
-            };
-            let gap =
-                left_open(self.positions, alphas[upper], alphas[lower]) - left_open(rest, 1.0, 1.0);
+            let at = self.positions;
+            let left_open = (at[upper] + on_face(upper)) - (at[lower] + on_face(lower));
+            let gap = left_open - ((rest[upper] + du) - (rest[lower] + dl));
             let share = du.norm() / (du.norm() + dl.norm()).max(f64::EPSILON);
             upper_marks.push((upper, -share * gap));
             lower_marks.push((lower, (1.0 - share) * gap));

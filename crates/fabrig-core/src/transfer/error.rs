@@ -48,4 +48,22 @@ pub enum TransferError {
         /// Positions given.
         found: usize,
     },
+    /// Deformation transfer has no answer on this face.
+    #[error(
+        "deformation transfer onto this face could not be solved ({unknowns} unknowns): its \
+         normalized mesh has degenerate triangles; use another offset mode, or look at the \
+         registration report"
+    )]
+    Unsolvable {
+        /// Vertices that are free to move.
+        unknowns: usize,
+    },
+    /// An example expression does not fit the template.
+    #[error("example {name}: {reason}")]
+    Example {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
 }

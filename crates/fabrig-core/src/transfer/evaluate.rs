@@ -154,7 +154,7 @@ impl PatchTransfer {
 
 /// `x -> c + R(phi)(x - c) + alpha (w_o r_o + w_c r_c + w_o w_c pair)` and its rate, with
 /// `phi = theta (w_o m_o - w_c m_c)`.
-fn turn_with_jaw(
+pub(super) fn turn_with_jaw(
     jaw: &JawField,
     hinge: &JawHinge,
     alpha: f32,
@@ -239,7 +239,7 @@ mod tests {
             Some(&shapes[0].deltas),
             Some(&shapes[1].deltas),
         );
-        let lids = LidField::new(&nodes, &eyes, &nodes, &eyes, &shapes, &[1.0; 2]);
+        let lids = LidField::new(&nodes, &eyes, &nodes, &eyes, &shapes, |_, _| 1.0);
         Fixture {
             hinge,
             jaw_shapes: JawShapes {

@@ -139,14 +139,23 @@ impl JawField {
 
     /// Scales what the jaw does besides turning, node by node.
     pub fn scale_residuals(&mut self, factors: &[f64]) {
+        self.change_residuals(|node, vector| vector * factors[node] as f32);
+    }
+
+    /// Takes what the jaw does besides turning through a map, node by node.
+    pub fn map_residuals(&mut self, map: impl Fn(usize) -> Matrix3<f64>) {
+        self.change_residuals(|node, vector| map(node).cast::<f32>() * vector);
+    }
+
+    fn change_residuals(&mut self, change: impl Fn(usize, Vector3<f32>) -> Vector3<f32>) {
         let lists = [
             &mut self.open_residual,
             &mut self.close_residual,
             &mut self.pair,
         ];
         for list in lists {
-            for (vector, factor) in list.iter_mut().zip(factors) {
-                *vector *= *factor as f32;
+            for (node, vector) in list.iter_mut().enumerate() {
+                *vector = change(node, *vector);
             }
         }
     }

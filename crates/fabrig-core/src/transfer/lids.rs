@@ -50,7 +50,7 @@ impl LidField {
     ///
     /// - `template_nodes`, `template_eyes`: the patch and eyes at rest on the template (mm)
     /// - `nodes`, `eyes`: the patch and centres of rotation at rest on this face (mm)
-    /// - `alphas`: amplitude at each node
+    /// - `alpha`: amplitude of a node, by index, under a shape, by its place in `shapes`
     ///
     /// Returns `None` where there are none.
     pub fn new(
@@ -59,7 +59,7 @@ impl LidField {
         nodes: &[Point],
         eyes: &[EyeSocket; 2],
         shapes: &[MuscleShape],
-        alphas: &[f64],
+        alpha: impl Fn(usize, usize) -> f64,
     ) -> Option<Self> {
         let mut found = Vec::new();
         for (i, p) in template_nodes.iter().enumerate() {
@@ -72,9 +72,10 @@ impl LidField {
                 let rest = (p - socket.center).norm();
                 let radius_changes: Vec<f32> = shapes
                     .iter()
-                    .map(|s| {
+                    .enumerate()
+                    .map(|(k, s)| {
                         let moved = p + s.deltas[i].cast::<f64>() - socket.center;
-                        (alphas[i] * (moved.norm() - rest)) as f32
+                        (alpha(i, k) * (moved.norm() - rest)) as f32
                     })
                     .collect();
                 let rest_radius = (nodes[i] - eyes[e].center).norm() as f32;
@@ -162,7 +163,7 @@ mod tests {
             &[open],
             &eyes,
             std::slice::from_ref(&shape),
-            &[1.0],
+            |_, _| 1.0,
         )
         .unwrap();
         let node = &field.nodes[0];
@@ -183,6 +184,9 @@ mod tests {
     fn nodes_far_from_the_eyes_do_not_slide() {
         let eyes = eyes();
         let p = Point::new(30.0, 30.0, 10.0);
-        assert_eq!(LidField::new(&[p], &eyes, &[p], &eyes, &[], &[1.0]), None);
+        assert_eq!(
+            LidField::new(&[p], &eyes, &[p], &eyes, &[], |_, _| 1.0),
+            None
+        );
     }
 }

@@ -2,10 +2,12 @@
 //! instant.
 //!
 //! Eq. 1-2 turn whole-face shapes into muscle shapes, one set a patch ([`muscle_shapes`]);
-//! Eq. 3, `X_p = b_0 + alpha_p sum_i w_i Db_i`, puts them on a face ([`PatchTransfer`]), with
-//! three parts that a sum of straight lines cannot hold: the jaw turns about its hinge
-//! ([`JawField`]), lids slide over the eyeball ([`LidField`]), and lids that close meet on a
-//! face whose eyes open differently ([`LidClosing`]).
+//! Eq. 3, `X_p = b_0 + alpha_p sum_i w_i Db_i`, puts them on a face ([`PatchTransfer`]):
+//! displacements in one of several ways ([`OffsetMode`]), with amplitudes from size alone or
+//! fitted to the face's own expressions ([`fit_alphas`]). Three parts are its own that a sum of
+//! straight lines cannot hold: the jaw turns about its hinge ([`JawField`]), lids slide over
+//! the eyeball ([`LidField`]), and lids that close meet on a face whose eyes open differently
+//! ([`LidClosing`]).
 //!
 //! # Source
 //!
@@ -17,16 +19,28 @@ mod blendshape;
 mod closing;
 mod error;
 mod evaluate;
+mod fit_alpha;
+mod fit_maps;
 mod jaw;
 mod lids;
+mod offset;
+mod poisson;
 mod roles;
 
 pub use alpha::{ALPHA_LIMITS, size_ratio};
 pub use alpha_field::AlphaField;
-pub use blendshape::{MuscleShape, ShapeSampler, muscle_shapes, smoothed_normals};
+pub use blendshape::{
+    MuscleShape, ShapeSampler, muscle_shapes, muscle_shapes_on_face, smoothed_normals,
+};
 pub use closing::LidClosing;
 pub use error::TransferError;
 pub use evaluate::{PatchTransfer, ShapeWeights, TransferContext};
+pub use fit_alpha::{
+    AlphaMode, Amplitudes, Example, Observation, PatchEvidence, check_examples, fit_alphas,
+    fit_open_angle,
+};
+pub use fit_maps::fit_maps;
 pub use jaw::{JawField, JawMode, JawPose};
 pub use lids::{LidField, LidNode};
+pub use offset::{FaceOffsets, OffsetMode, offsets_on_face};
 pub use roles::{EyeShapes, JawShapes};

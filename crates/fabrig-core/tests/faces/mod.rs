@@ -21,6 +21,7 @@ pub(crate) fn template_rig() -> Rig {
         positions: template.skin.positions(),
         places: &places,
         rigid: &[],
+        examples: &[],
         report: String::new(),
     };
     build(&face, template, &RigOptions::default()).expect("the template can be rigged")

@@ -7,6 +7,7 @@ mod plot;
 mod registration;
 mod runtime;
 mod stability;
+mod table3;
 
 use anyhow::Result;
 
@@ -21,5 +22,6 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
         BenchCommand::Pareto(args) => pareto::run(console, args),
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),
+        BenchCommand::Table3(args) => table3::run(console, args),
     }
 }

@@ -33,7 +33,8 @@ impl Specimen {
         Self::from_truth(template, &person.positions)
     }
 
-    fn from_truth(template: &Template, truth: &[Point]) -> Self {
+    /// The template's topology at any places.
+    pub fn from_truth(template: &Template, truth: &[Point]) -> Self {
         Self {
             truth: truth.to_vec(),
             is_present: vec![true; truth.len()],

@@ -1,0 +1,19 @@
+//! How near a rig comes to a face's own expressions, beside whole-face delta transfer: Table 3.
+//!
+//! A face that has its own shapes is rigged from its neutral mesh; poses are then compared with
+//! the face's own, vertex by vertex. Delta transfer, the yardstick, adds the template's whole
+//! displacements times the ratio of head sizes at the same places of the same registration.
+//!
+//! # Source
+//!
+//! Zhu & Joslin 2024, section 4.2, Table 3.
+
+mod delta_transfer;
+mod faces;
+mod space_map;
+mod table3;
+
+pub use faces::{OwnFace, synthetic_faces};
+pub use table3::{
+    Drive, FaceResult, METHODS, Method, POSES, Pose, PoseError, Table3, Table3Error, evaluate_face,
+};
