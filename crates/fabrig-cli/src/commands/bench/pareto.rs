@@ -86,13 +86,14 @@ fn print(console: &Console, result: &Pareto) {
         floor.ns_per_constraint, floor.lane_count
     ));
     console.result(&format!(
-        "{:<20}{:>9}{:>10}{:>8}{:>8}{:>9}{:>9}{:>10}{:>9}{:>8}",
+        "{:<20}{:>9}{:>10}{:>8}{:>8}{:>9}{:>9}{:>9}{:>10}{:>9}{:>8}",
         "mode",
         "substeps",
         "median ms",
         "95 %",
         "least",
         "x floor",
+        "least x",
         "RMS mm",
         "max mm",
         "relative",
@@ -102,13 +103,14 @@ fn print(console: &Console, result: &Pareto) {
         let setting = &point.setting;
         let floor_ms = floor.frame_ms(setting.substeps, setting.sweeps);
         console.result(&format!(
-            "{:<20}{:>9}{:>10.3}{:>8.3}{:>8.3}{:>9.2}{:>9.4}{:>10.4}{:>9.2e}{:>8}",
+            "{:<20}{:>9}{:>10.3}{:>8.3}{:>8.3}{:>9.2}{:>9.2}{:>9.4}{:>10.4}{:>9.2e}{:>8}",
             setting.family(),
             setting.substeps,
             point.median_ms,
             point.p95_ms,
             point.least_ms,
             point.median_ms / floor_ms,
+            point.least_ms / floor_ms,
             point.error.rms,
             point.error.max,
             point.error.relative,

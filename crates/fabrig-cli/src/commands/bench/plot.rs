@@ -139,7 +139,7 @@ fn plot(out: &mut String, result: &Pareto) {
         "middle",
         "ms per frame",
     );
-    text(out, 12.0, 14.0, "start", "relative error");
+    text(out, x.from, 14.0, "start", "relative error");
     line(out, [x.from, y.at(0.01), x.to, y.at(0.01)], "#555", "6 4");
     for mark in marks.into_iter().filter(|m| *m > 0.0) {
         line(out, [x.from, y.at(mark), x.to, y.at(mark)], "#555", "2 3");

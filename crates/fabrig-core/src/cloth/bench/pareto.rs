@@ -119,7 +119,7 @@ pub fn settings(is_full: bool) -> Vec<Setting> {
         ..base
     };
     let of_mode = |mode| Setting { mode, ..base };
-    let all: &[u32] = &[1, 2, 3, 4, 5, 6, 8, 12, 16, 32, 64, 128];
+    let all: &[u32] = &[1, 2, 3, 4, 6, 8, 10, 12, 16, 32, 64, 128];
     let lines: Vec<(Setting, &[u32])> = if is_full {
         vec![
             (base, all),
@@ -133,7 +133,7 @@ pub fn settings(is_full: bool) -> Vec<Setting> {
         ]
     } else {
         vec![
-            (base, &[1, 2, 4, 5, 6, 8, 16, 32]),
+            (base, &[1, 2, 4, 6, 8, 10, 16, 32]),
             (euler, &[1, 4, 8, 32]),
             (with_sweeps(2), &[1, 4, 8]),
             (with_sweeps(4), &[1, 4]),
