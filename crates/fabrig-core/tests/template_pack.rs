@@ -216,6 +216,7 @@ fn damaged_packs_are_refused() -> Result<(), Box<dyn std::error::Error>> {
         Template::from_files(&PackFiles {
             description,
             geometry,
+            identity: &[],
             patch_layout: "",
             action_units: "",
             materials: "",

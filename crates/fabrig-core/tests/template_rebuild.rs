@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use fabrig_core::template::Template;
-use fabrig_core::template::build::{FaceList, build_geometry, build_template};
+use fabrig_core::template::build::{FaceList, IdentityRecipe, build_geometry, build_template};
 
 fn templates() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../templates")
@@ -23,12 +23,15 @@ fn the_committed_pack_is_what_the_source_gives() -> Result<(), Box<dyn std::erro
     )?)?;
     let face_file = templates().join("demo/face.bin");
     let people_file = templates().join("demo/people.bin");
+    let identities =
+        IdentityRecipe::parse(&std::fs::read_to_string(human.join("identities.toml"))?)?;
     if std::env::var_os("FABRIG_REBUILD").is_some() {
         let report = build_template(data, &human)?;
         println!("{report:#?}");
         let template = Template::load(&human)?;
         faces.write(data, &template, "demo", &face_file)?;
         faces.write_people(data, &template, &people_file)?;
+        identities.write(data, &template, &human.join("identity.bin"))?;
         return Ok(());
     }
     let text = std::fs::read_to_string(human.join("template.toml"))?;
@@ -43,6 +46,11 @@ fn the_committed_pack_is_what_the_source_gives() -> Result<(), Box<dyn std::erro
     assert!(
         std::fs::read(&again)? == std::fs::read(face_file)?,
         "face.bin is not what the source and faces.toml give: rebuild it"
+    );
+    identities.write(data, &Template::load(&human)?, &again)?;
+    assert!(
+        std::fs::read(&again)? == std::fs::read(human.join("identity.bin"))?,
+        "identity.bin is not what the source and identities.toml give: rebuild it"
     );
     faces.write_people(data, &Template::load(&human)?, &again)?;
     assert!(

@@ -7,13 +7,16 @@
 //!    the mesh (voxel grid, template millimetres, so that size plays no part).
 //! 2. Settle the better guesses by a few steps of ICP on the same grid.
 //! 3. Refine the best of those by trimmed point-to-plane ICP with scale, both ways.
-//! 4. Confidence: the margin of the best over the best that differs from it.
+//! 4. Let each of these take the shape of a person, as far as people differ: a heavy brow must
+//!    not look like a wrong place.
+//! 5. Confidence: the margin of the best over the best that differs from it.
 
 use nalgebra::{SMatrix, SVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
 
 use super::closest_grid::{ClosestGrid, Sample, sample_surface};
 use super::face_model::FaceModel;
+use super::identity_fit::{Fitting, fit_identity};
 use crate::mesh::Surface;
 use crate::{Point, Vector};
 
@@ -26,8 +29,20 @@ const DIAGONALS_MM: [f64; 11] = [
     210.0, 250.0, 300.0, 360.0, 430.0, 520.0, 620.0, 740.0, 900.0, 1150.0, 1500.0,
 ];
 const ANCHOR_COUNT: usize = 700;
+/// Samples that normals of anchors are averaged from, at most.
+const AVERAGED_COUNT: usize = 100_000;
 const SETTLED_COUNT: usize = 2400;
 const REFINED_COUNT: usize = 20;
+const FITTED_COUNT: usize = 12;
+/// How a guess takes the shape of a person.
+const FITTING: Fitting = Fitting {
+    mode_count: 30,
+    rounds: 12,
+    sigma: [4.0, 1.5],
+    reach: [25.0, 14.0],
+};
+/// What an unlikely person costs, for each squared standard deviation. (mm)
+const UNLIKELY_MM: f64 = 0.01;
 
 /// A similarity that takes the mesh to the head frame, and how much it can be trusted.
 #[derive(Debug, Clone, Copy)]
@@ -61,8 +76,12 @@ pub(super) fn align(
     let grid = ClosestGrid::new(samples, diagonal / 120.0, diagonal * 0.12);
     let anchors = anchors(&grid, diagonal);
 
-    let coarse = model.spread_samples(18);
-    let fine = model.spread_samples(140);
+    let spread = model.spread_vertices(260);
+    let points = model.samples(&spread);
+    let (coarse, fine) = (
+        &points[..18.min(points.len())],
+        &points[..140.min(points.len())],
+    );
     let nose = model.nose_tip();
 
     let mut guesses: Vec<Guess> = anchors
@@ -81,13 +100,13 @@ pub(super) fn align(
                         * UnitQuaternion::from_axis_angle(&Vector::x_axis(), tilt.to_radians());
                     for size in DIAGONALS_MM {
                         let from_head = place(anchor.point, nose, turn, diagonal / size);
-                        let score = judge(&grid, &coarse, &from_head);
+                        let score = judge(&grid, coarse, &from_head);
                         keep(&mut best, Guess { score, from_head }, 6);
                     }
                 }
             }
             for guess in &mut best {
-                guess.score = judge(&grid, &fine, &guess.from_head);
+                guess.score = judge(&grid, fine, &guess.from_head);
             }
             best
         })
@@ -95,15 +114,14 @@ pub(super) fn align(
         .collect();
     guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
     guesses.truncate(SETTLED_COUNT);
-    let sparse = model.spread_samples(70);
+    let sparse = &points[..70.min(points.len())];
     guesses = guesses
         .par_iter()
-        .map(|g| settle(&grid, &sparse, &fine, &g.from_head))
+        .map(|g| settle(&grid, sparse, fine, &g.from_head))
         .collect();
     guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
     let chosen = distinct(&guesses, REFINED_COUNT, 12.0, 15.0, 1.12);
 
-    let points = model.spread_samples(260);
     let mut refined: Vec<Guess> = chosen
         .par_iter()
         .map(|g| refine(model, surface, grid.samples(), &points, &g.from_head, 14))
@@ -116,11 +134,19 @@ pub(super) fn align(
             if further.score < g.score { further } else { *g }
         })
         .collect();
-    finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let best = *finalists.first()?;
-    let rival = refined
+    finalists.extend(
+        distinct(&refined, FITTED_COUNT, 10.0, 12.0, 1.1)
+            .into_iter()
+            .skip(6),
+    );
+    let mut fitted: Vec<Guess> = finalists
+        .par_iter()
+        .map(|g| fit(model, surface, &spread, g))
+        .collect();
+    fitted.sort_by(|a, b| a.score.total_cmp(&b.score));
+    let best = *fitted.first()?;
+    let rival = fitted
         .iter()
-        .chain(&finalists)
         .filter(|g| differs(&best.from_head, &g.from_head, 45.0, 25.0, 1.35))
         .map(|g| g.score)
         .fold(CUTOFF_MM, f64::min);
@@ -215,13 +241,16 @@ fn anchors(grid: &ClosestGrid, diagonal: f64) -> Vec<Sample> {
     let samples = grid.samples();
     let spread = spread(samples, ANCHOR_COUNT * 2);
     let radius_squared = (diagonal * 0.03).powi(2);
+    // A fine mesh has more samples than an average needs.
+    let stride = samples.len().div_ceil(AVERAGED_COUNT).max(1);
+    let averaged: Vec<&Sample> = samples.iter().step_by(stride).collect();
     let mut bulging: Vec<(f64, Sample)> = spread
         .par_iter()
         .filter_map(|anchor| {
             let mut normal = Vector::zeros();
             let mut middle = Vector::zeros();
             let mut count = 0.0;
-            for s in samples {
+            for s in &averaged {
                 let d = s.point - anchor.point;
                 if d.norm_squared() < radius_squared && s.normal.dot(&anchor.normal) > -0.3 {
                     normal += s.normal;
@@ -377,6 +406,56 @@ fn refine(
     Guess {
         score: score(surface, points, &from_head),
         from_head,
+    }
+}
+
+/// A guess whose template is shaped like a person, judged by that shape.
+fn fit(model: &FaceModel<'_>, surface: &Surface, spread: &[(u32, f64)], guess: &Guess) -> Guess {
+    let from_head = guess.from_head;
+    let to_head = from_head.inverse();
+    let closest = |p: &Point, n: &Vector, reach: f64| {
+        let n = from_head.isometry.rotation * n;
+        let at = surface.closest_where(
+            &from_head.transform_point(p),
+            reach * from_head.scaling(),
+            |at| facing(surface, at.triangle, &n) > 0.3,
+        )?;
+        let normal = to_head.isometry.rotation * unit_normal(surface, at.triangle);
+        Some((to_head.transform_point(&at.point), normal))
+    };
+    let shaped = fit_identity(
+        model,
+        spread,
+        &closest,
+        &|_, _| Vec::new(),
+        &[],
+        Similarity3::identity(),
+        &FITTING,
+    );
+    let ratio = shaped.similarity.scaling();
+    if !(0.6..1.6).contains(&ratio) {
+        return *guess;
+    }
+    // Back where the similarity takes them from.
+    let own = shaped.similarity.inverse();
+    let samples: Vec<Sample> = spread
+        .iter()
+        .map(|&(v, weight)| Sample {
+            point: own.transform_point(&shaped.vertex(model, v as usize)),
+            normal: model.normals[v as usize],
+            weight,
+        })
+        .collect();
+    let placed = from_head * shaped.similarity;
+    let score =
+        score(surface, &samples, &placed) + UNLIKELY_MM * shaped.coefficients.norm_squared();
+    if score < guess.score {
+        Guess {
+            score,
+            from_head: placed,
+        }
+    } else {
+        *guess
     }
 }
 

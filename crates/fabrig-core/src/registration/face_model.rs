@@ -90,7 +90,7 @@ pub(super) struct FaceModel<'a> {
     pub(super) openings: Vec<Opening>,
     /// Where one sees them part on the template itself.
     pub(super) partings: Vec<Parting>,
-    triangle_roles: Vec<Role>,
+    pub(super) triangle_roles: Vec<Role>,
     unit_triangle_normals: Vec<Vector>,
 }
 
@@ -171,19 +171,25 @@ impl<'a> FaceModel<'a> {
         })
     }
 
-    /// About `count` vertices of the front of the face, spread by farthest-point sampling from
-    /// the nose tip on: a prefix of a longer list is the shorter one.
-    pub(super) fn spread_samples(&self, count: usize) -> Vec<Sample> {
-        let candidates: Vec<usize> = (0..self.roles.len())
+    /// Vertices of the face proper.
+    pub(super) fn face_vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.roles.len() as u32).filter(|&v| self.roles[v as usize] == Role::Face)
+    }
+
+    /// About `count` vertices of the front of the face with what each tells, spread by
+    /// farthest-point sampling from the nose tip on: a prefix of a longer list is the shorter
+    /// one.
+    pub(super) fn spread_vertices(&self, count: usize) -> Vec<(u32, f64)> {
+        let candidates: Vec<u32> = self
+            .face_vertices()
             .filter(|&v| {
-                self.roles[v] == Role::Face
-                    && self.normals[v].z > 0.1
-                    && (self.positions()[v] - self.nose_tip()).norm() < FRONT_MM
+                self.normals[v as usize].z > 0.1
+                    && (self.positions()[v as usize] - self.nose_tip()).norm() < FRONT_MM
             })
             .collect();
         let mut distance: Vec<f64> = candidates
             .iter()
-            .map(|&v| (self.positions()[v] - self.nose_tip()).norm_squared())
+            .map(|&v| (self.positions()[v as usize] - self.nose_tip()).norm_squared())
             .collect();
         let mut chosen = Vec::new();
         while chosen.len() < count.min(candidates.len()) {
@@ -192,17 +198,27 @@ impl<'a> FaceModel<'a> {
             else {
                 break;
             };
-            let point = self.positions()[candidates[k]];
-            chosen.push(Sample {
-                point,
-                normal: self.normals[candidates[k]],
-                weight: 0.25 + (self.detail(candidates[k]) / 0.08).min(1.0),
-            });
+            let vertex = candidates[k];
+            let point = self.positions()[vertex as usize];
+            let weight = 0.25 + (self.detail(vertex as usize) / 0.08).min(1.0);
+            chosen.push((vertex, weight));
             for (d, &v) in distance.iter_mut().zip(&candidates) {
-                *d = d.min((self.positions()[v] - point).norm_squared());
+                *d = d.min((self.positions()[v as usize] - point).norm_squared());
             }
         }
         chosen
+    }
+
+    /// Vertices as samples.
+    pub(super) fn samples(&self, vertices: &[(u32, f64)]) -> Vec<Sample> {
+        vertices
+            .iter()
+            .map(|&(v, weight)| Sample {
+                point: self.positions()[v as usize],
+                normal: self.normals[v as usize],
+                weight,
+            })
+            .collect()
     }
 
     /// How much normals vary around a vertex, 0 = flat: nose, lips and eyes tell more about

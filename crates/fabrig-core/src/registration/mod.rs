@@ -4,9 +4,10 @@
 //!
 //! 1. `clean`: a welded, oriented copy, split into pieces.
 //! 2. `alignment` (no landmarks) or `similarity` (landmarks): units, place, orientation.
-//! 3. `nonrigid_icp` on the coarse `node_graph`, then `refinement` at full resolution; mouth
+//! 3. `identity_fit`: the template shaped by how people differ.
+//! 4. `nonrigid_icp` on the coarse `node_graph`, then `refinement` at full resolution; mouth
 //!    and eyes by `openings`.
-//! 4. `mapping` from the user's vertices to the template, `parts` that are not skin, `report`.
+//! 5. `mapping` from the user's vertices to the template, `parts` that are not skin, `report`.
 //!
 //! The user's mesh stays the skin; the registered template only carries anatomy to it.
 //!
@@ -22,6 +23,7 @@ mod closest_grid;
 mod cut;
 mod error;
 mod face_model;
+mod identity_fit;
 mod landmarks;
 mod lining;
 mod mapping;

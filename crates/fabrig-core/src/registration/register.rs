@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::alignment::align;
 use super::clean::{CleanMesh, clean, closed_volume};
 use super::face_model::{FaceModel, OpeningKind, Role};
+use super::identity_fit::shape_to;
 use super::mapping::map_vertices;
 use super::node_graph::NodeGraph;
 use super::nonrigid_icp::{Pin, deform_coarse};
@@ -125,24 +126,28 @@ pub fn register(
     let start = align_face(&model, &mut cleaned, &landmarks, options)?;
     clock.finish("align");
 
-    clock.step("deform", 0.35)?;
+    clock.step("shape", 0.35)?;
     let piece = &cleaned.pieces[start.piece];
     let target = target_of(&cleaned, start.piece, &start.to_head)?;
     let graph = NodeGraph::new(model.positions(), &model.topology, 1);
     let pins = Pins::new(&landmarks, &start.to_head);
+    let shaped = shape_to(&model, &target, &pins.at(&model, &[], 1.0));
+    clock.finish("shape");
+
+    clock.step("deform", 0.4)?;
     let mut partings: Vec<Parting> = Vec::new();
     let coarse = deform_coarse(
         &model,
         &graph,
         &target,
-        model.positions(),
+        &shaped,
         &mut |vertices, is_first_of_stage| {
             if is_first_of_stage {
                 partings = find_partings(&model.openings, &target.surface, vertices);
             }
             pins.at(&model, &partings, 1.0)
         },
-        |share| clock.step("deform", 0.35 + 0.3 * share),
+        |share| clock.step("deform", 0.4 + 0.25 * share),
     )?;
     clock.finish("deform");
 

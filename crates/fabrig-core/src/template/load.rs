@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use super::description::{Description, mirrored_name};
 use super::geometry::{StoredGeometry, StoredMesh, StoredShape, decode, to_point, to_vector};
+use super::identity::load_modes;
 use super::{
     Landmarks, Region, RegionId, Regions, RigidPart, Template, TemplateError, WholeFaceShape,
 };
@@ -17,6 +18,8 @@ pub struct PackFiles<'a> {
     pub description: &'a str,
     /// `geometry.bin`
     pub geometry: &'a [u8],
+    /// `identity.bin`; empty for a pack that has none
+    pub identity: &'a [u8],
     /// `patches.toml`
     pub patch_layout: &'a str,
     /// `action_units.toml`
@@ -31,6 +34,7 @@ static HUMAN: LazyLock<Template> = LazyLock::new(|| {
     let files = PackFiles {
         description: include_str!("../../../../templates/human/template.toml"),
         geometry: include_bytes!("../../../../templates/human/geometry.bin"),
+        identity: include_bytes!("../../../../templates/human/identity.bin"),
         patch_layout: include_str!("../../../../templates/human/patches.toml"),
         action_units: include_str!("../../../../templates/human/action_units.toml"),
         materials: include_str!("../../../../templates/human/materials.toml"),
@@ -51,7 +55,8 @@ pub fn human() -> &'static Template {
 
 impl Template {
     /// Reads a pack from its folder (`template.toml`, `geometry.bin`, `patches.toml`,
-    /// `action_units.toml`, `materials.toml`, and `skin_weights.bin` where it has one).
+    /// `action_units.toml`, `materials.toml`, and `identity.bin` and `skin_weights.bin` where it
+    /// has them).
     ///
     /// # Errors
     ///
@@ -68,6 +73,11 @@ impl Template {
         Self::from_files(&PackFiles {
             description: &text("template.toml")?,
             geometry: &bytes("geometry.bin")?,
+            identity: &if folder.join("identity.bin").exists() {
+                bytes("identity.bin")?
+            } else {
+                Vec::new()
+            },
             patch_layout: &text("patches.toml")?,
             action_units: &text("action_units.toml")?,
             materials: &text("materials.toml")?,
@@ -125,6 +135,11 @@ fn assemble(
         landmarks: landmarks(description, &stored.mirror)?,
         regions: regions(description, &stored.vertex_regions, skin.vertex_count())?,
         part_deltas: part_deltas(stored, &rigid_parts)?,
+        identity_modes: if files.identity.is_empty() {
+            Vec::new()
+        } else {
+            load_modes(files.identity, &stored.mirror)?
+        },
         mirror: stored.mirror.clone(),
         skin,
         rigid_parts,

@@ -7,6 +7,7 @@ mod demo;
 mod description;
 mod error;
 mod geometry;
+mod identity;
 mod load;
 mod pack;
 mod people;

@@ -135,6 +135,9 @@ pub struct Template {
     pub landmarks: Landmarks,
     /// Where each landmark is, in words, by name; left ones speak for their mirror images.
     pub landmark_meanings: BTreeMap<String, String>,
+    /// How people differ, largest first, mirror symmetric: one vector per skin vertex each; may
+    /// be empty. (mm per standard deviation)
+    pub identity_modes: Vec<Vec<Vector>>,
     /// Eyeballs, teeth, tongue.
     pub rigid_parts: Vec<RigidPart>,
     /// Whole-face shapes in the pack's order (ARKit's 52 first).

@@ -12,6 +12,7 @@
 //!    smoothed, lids kept outside the eyeball and closed in blinks, lips sealed or opened and
 //!    kept out of each other, each half kept to its own side.
 //!
+//! [`IdentityRecipe`] makes `identity.bin`: how people differ, from the source's own targets.
 //! [`FaceList`] makes faces of other people from the same source: remeshed for tests and for the
 //! demo, and in the template's topology as the truth that registration is measured against.
 
@@ -21,6 +22,7 @@ mod crop;
 mod decimate;
 mod face;
 mod fairing;
+mod identities;
 mod identity;
 mod lids;
 mod linings;
@@ -34,4 +36,5 @@ mod subdivide;
 
 pub(crate) use decimate::decimate;
 pub use face::FaceList;
+pub use identities::IdentityRecipe;
 pub use pack::{BuildReport, build_geometry, build_template};
