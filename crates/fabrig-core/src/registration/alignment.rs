@@ -40,6 +40,7 @@ const FITTING: Fitting = Fitting {
     rounds: 12,
     sigma: [4.0, 1.5],
     reach: [25.0, 14.0],
+    has_own_normals: false,
 };
 /// What an unlikely person costs, for each squared standard deviation. (mm)
 const UNLIKELY_MM: f64 = 0.01;
@@ -427,7 +428,7 @@ fn fit(model: &FaceModel<'_>, surface: &Surface, spread: &[(u32, f64)], guess: &
         model,
         spread,
         &closest,
-        &|_, _| Vec::new(),
+        &|_, _, _| Vec::new(),
         &[],
         Similarity3::identity(),
         &FITTING,

@@ -13,7 +13,7 @@
 //! Source: Blanz & Vetter 1999, A Morphable Model for the Synthesis of 3D Faces; plane distances
 //! after Chen & Medioni 1992.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Similarity3, Translation3, Unit, UnitQuaternion};
+use nalgebra::{DMatrix, DVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
 
 use super::face_model::{FaceModel, Role};
@@ -27,7 +27,9 @@ const INDEPENDENT_COUNT: f64 = 40.0;
 /// A pin is worth this many.
 const PIN_COUNT: f64 = 3.0;
 /// Share of distances along the surface.
-const TANGENTIAL: f64 = 0.03;
+const TANGENTIAL: f64 = 0.1;
+/// Places whose equations are set up together.
+const BLOCK: usize = 48;
 
 /// How closely, and with what, a shape is fitted.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,8 @@ pub(super) struct Fitting {
     pub(super) sigma: [f64; 2],
     /// How far closest places may be in the first and in the last round. (mm)
     pub(super) reach: [f64; 2],
+    /// Whether normals are those of the shape so far, or the template's own.
+    pub(super) has_own_normals: bool,
 }
 
 /// Something to fit to, in the head frame: closest place to (point, normal) within a reach.
@@ -84,13 +88,14 @@ impl IdentityFit {
 
 /// Fits the shape at `vertices` (weighted) to what `closest` finds.
 ///
-/// - `pulled`: further places found from the face's side, given the fit so far
+/// - `pulled`: further places found from the face's side, given the shape so far, its normals
+///   and how far to look; asked where [`Fitting::has_own_normals`]
 /// - `pins`: places that are known whatever is closest
 pub(super) fn fit_identity(
     model: &FaceModel<'_>,
     vertices: &[(u32, f64)],
     closest: &Closest<'_>,
-    pulled: &dyn Fn(&IdentityFit, f64) -> Vec<Pulled>,
+    pulled: &dyn Fn(&[Point], &[Vector], f64) -> Vec<Pulled>,
     pins: &[Pin],
     start: Similarity3<f64>,
     fitting: &Fitting,
@@ -104,11 +109,21 @@ pub(super) fn fit_identity(
         let share = round as f64 / (fitting.rounds.max(2) - 1) as f64;
         let between = |[a, b]: [f64; 2]| a * (b / a).powf(share);
         let (sigma, reach) = (between(fitting.sigma), between(fitting.reach));
+        let shape = fitting.has_own_normals.then(|| {
+            let shape = fit.vertices(model);
+            let normals = vertex_normals(&shape, &model.triangles);
+            (shape, normals)
+        });
         let mut places: Vec<Pulled> = vertices
             .par_iter()
             .filter_map(|&(v, weight)| {
-                let at = fit.vertex(model, v as usize);
-                let n = fit.similarity.isometry.rotation * model.normals[v as usize];
+                let (at, n) = match &shape {
+                    Some((shape, normals)) => (shape[v as usize], normals[v as usize]),
+                    None => (
+                        fit.vertex(model, v as usize),
+                        fit.similarity.isometry.rotation * model.normals[v as usize],
+                    ),
+                };
                 let (place, normal) = closest(&at, &n, reach)?;
                 Some(Pulled {
                     corners: [(v, 1.0), (v, 0.0), (v, 0.0)],
@@ -118,23 +133,23 @@ pub(super) fn fit_identity(
                 })
             })
             .collect();
-        places.extend(pulled(&fit, reach));
+        if let Some((shape, normals)) = &shape {
+            places.extend(pulled(shape, normals, reach));
+        }
         if places.len() < 30 {
             break;
         }
-        let distances: Vec<f64> = places
+        let gaps: Vec<Vector> = places
             .iter()
-            .map(|p| (p.place - now(model, &fit, &p.corners)).norm())
+            .map(|p| p.place - now(model, &fit, shape.as_ref().map(|s| &s.0[..]), &p.corners))
             .collect();
+        let distances: Vec<f64> = gaps.iter().map(Vector::norm).collect();
         let (median, _) = median_and_deviation(&distances);
         // What no person's shape explains is no reason to make an unlikely one.
         let mut off: Vec<f64> = places
             .iter()
-            .map(|p| {
-                (p.place - now(model, &fit, &p.corners))
-                    .dot(&p.normal)
-                    .abs()
-            })
+            .zip(&gaps)
+            .map(|(p, gap)| gap.dot(&p.normal).abs())
             .collect();
         let middle = off.len() / 2;
         let spread = 1.4826 * *off.select_nth_unstable_by(middle, f64::total_cmp).1;
@@ -146,22 +161,25 @@ pub(super) fn fit_identity(
             sum += p.weight;
         }
         let unit = INDEPENDENT_COUNT / (sum.max(1e-9) * sigma * sigma);
-        let mut system = System::new(mode_count);
-        for p in &places {
-            let metric = p.normal * p.normal.transpose() + Matrix3::identity() * TANGENTIAL;
-            system.add(
-                model,
-                &fit,
-                &p.corners,
-                &p.place,
-                &(metric * (p.weight * unit)),
-            );
-        }
+        let mut bonds: Vec<Bond> = places
+            .iter()
+            .map(|p| Bond {
+                corners: p.corners,
+                place: p.place,
+                normal: p.normal,
+                across: p.weight * unit * (1.0 + TANGENTIAL),
+                along: p.weight * unit * TANGENTIAL,
+            })
+            .collect();
         let pin_unit = PIN_COUNT / (sigma * sigma);
-        for pin in pins {
-            let metric = Matrix3::identity() * pin_unit;
-            system.add(model, &fit, &pin.corners, &pin.place, &metric);
-        }
+        bonds.extend(pins.iter().map(|pin| Bond {
+            corners: pin.corners,
+            place: pin.place,
+            normal: Vector::z(),
+            across: pin_unit,
+            along: pin_unit,
+        }));
+        let system = System::new(model, &fit, &bonds);
         if !system.step(&mut fit) {
             break;
         }
@@ -169,13 +187,33 @@ pub(super) fn fit_identity(
     fit
 }
 
-fn now(model: &FaceModel<'_>, fit: &IdentityFit, corners: &[(u32, f64); 3]) -> Point {
+/// Where the corners' place is, by the whole shape where that is known.
+fn now(
+    model: &FaceModel<'_>,
+    fit: &IdentityFit,
+    shape: Option<&[Point]>,
+    corners: &[(u32, f64); 3],
+) -> Point {
     let sum: Vector = corners
         .iter()
         .filter(|(_, share)| *share != 0.0)
-        .map(|&(v, share)| fit.vertex(model, v as usize).coords * share)
+        .map(|&(v, share)| {
+            let at = shape.map_or_else(|| fit.vertex(model, v as usize), |s| s[v as usize]);
+            at.coords * share
+        })
         .sum();
     Point::from(sum)
+}
+
+/// A place that draws a place of the template.
+struct Bond {
+    corners: [(u32, f64); 3],
+    place: Point,
+    normal: Vector,
+    /// How strongly along the normal.
+    across: f64,
+    /// How strongly along the surface.
+    along: f64,
 }
 
 /// Normal equations in the coefficients (whole) and a small similarity (increment).
@@ -183,71 +221,41 @@ struct System {
     mode_count: usize,
     a: DMatrix<f64>,
     b: DVector<f64>,
-    /// Rows of the Jacobian, one vector of millimetres for each unknown.
-    columns: Vec<Vector>,
-    weighted: Vec<Vector>,
 }
 
 impl System {
-    fn new(mode_count: usize) -> Self {
+    fn new(model: &FaceModel<'_>, fit: &IdentityFit, bonds: &[Bond]) -> Self {
+        let mode_count = fit.coefficients.len();
         let size = mode_count + 7;
-        Self {
-            mode_count,
-            a: DMatrix::zeros(size, size),
-            b: DVector::zeros(size),
-            columns: vec![Vector::zeros(); size],
-            weighted: vec![Vector::zeros(); size],
+        let blocks: Vec<(DMatrix<f64>, DVector<f64>)> = bonds
+            .par_chunks(BLOCK)
+            .map(|bonds| {
+                // A column for each equation.
+                let mut rows = DMatrix::zeros(size, 3 * bonds.len());
+                let mut residuals = DVector::zeros(3 * bonds.len());
+                let mut changes = vec![Vector::zeros(); size];
+                for (k, bond) in bonds.iter().enumerate() {
+                    let residual = changes_at(model, fit, bond, &mut changes);
+                    let [t, b] = tangents(&bond.normal);
+                    let directions = [(bond.normal, bond.across), (t, bond.along), (b, bond.along)];
+                    for (i, (direction, weight)) in directions.into_iter().enumerate() {
+                        let direction = direction * weight.sqrt();
+                        residuals[3 * k + i] = residual.dot(&direction);
+                        for (r, change) in rows.column_mut(3 * k + i).iter_mut().zip(&changes) {
+                            *r = change.dot(&direction);
+                        }
+                    }
+                }
+                (&rows * rows.transpose(), rows * residuals)
+            })
+            .collect();
+        let mut a = DMatrix::zeros(size, size);
+        let mut b = DVector::zeros(size);
+        for (own_a, own_b) in blocks {
+            a += own_a;
+            b += own_b;
         }
-    }
-
-    fn add(
-        &mut self,
-        model: &FaceModel<'_>,
-        fit: &IdentityFit,
-        corners: &[(u32, f64); 3],
-        place: &Point,
-        metric: &Matrix3<f64>,
-    ) {
-        let blend = |of: &dyn Fn(usize) -> Vector| -> Vector {
-            corners
-                .iter()
-                .filter(|(_, share)| *share != 0.0)
-                .map(|&(v, share)| of(v as usize) * share)
-                .sum()
-        };
-        let base = Point::from(blend(&|v| model.positions()[v].coords));
-        let turn = fit.similarity.isometry.rotation;
-        let scale = fit.similarity.scaling();
-        let mut moved = Vector::zeros();
-        for (k, mode) in model.template.identity_modes[..self.mode_count]
-            .iter()
-            .enumerate()
-        {
-            let m = turn * blend(&|v| mode[v]) * scale;
-            moved += m * fit.coefficients[k];
-            self.columns[k] = m;
-        }
-        let mean = fit.similarity.transform_point(&base);
-        let at = mean + moved;
-        let arm = at.coords / 100.0;
-        let axes = [Vector::x(), Vector::y(), Vector::z()];
-        for (k, axis) in axes.iter().enumerate() {
-            self.columns[self.mode_count + k] = *axis;
-            self.columns[self.mode_count + 3 + k] = axis.cross(&arm);
-        }
-        self.columns[self.mode_count + 6] = arm;
-        let residual = place - mean;
-        for (w, c) in self.weighted.iter_mut().zip(&self.columns) {
-            *w = metric * c;
-        }
-        for (i, c) in self.columns.iter().enumerate() {
-            self.b[i] += self.weighted[i].dot(&residual);
-            // Lower triangle, down the column.
-            let mut column = self.a.column_mut(i);
-            for (j, w) in self.weighted.iter().enumerate().skip(i) {
-                column[j] += w.dot(c);
-            }
-        }
+        Self { mode_count, a, b }
     }
 
     /// Solves with the prior and applies the step; `false` where nothing is determined.
@@ -276,12 +284,64 @@ impl System {
     }
 }
 
+/// How a place moves with each unknown; returns what it lacks with all coefficients at zero.
+fn changes_at(
+    model: &FaceModel<'_>,
+    fit: &IdentityFit,
+    bond: &Bond,
+    changes: &mut [Vector],
+) -> Vector {
+    let blend = |of: &dyn Fn(usize) -> Vector| -> Vector {
+        bond.corners
+            .iter()
+            .filter(|(_, share)| *share != 0.0)
+            .map(|&(v, share)| of(v as usize) * share)
+            .sum()
+    };
+    let base = Point::from(blend(&|v| model.positions()[v].coords));
+    let to_head = fit
+        .similarity
+        .isometry
+        .rotation
+        .to_rotation_matrix()
+        .into_inner()
+        * fit.similarity.scaling();
+    let mode_count = fit.coefficients.len();
+    let mut moved = Vector::zeros();
+    for (k, mode) in model.template.identity_modes[..mode_count]
+        .iter()
+        .enumerate()
+    {
+        let m = to_head * blend(&|v| mode[v]);
+        moved += m * fit.coefficients[k];
+        changes[k] = m;
+    }
+    let mean = fit.similarity.transform_point(&base);
+    let arm = (mean + moved).coords / 100.0;
+    let axes = [Vector::x(), Vector::y(), Vector::z()];
+    for (k, axis) in axes.iter().enumerate() {
+        changes[mode_count + k] = *axis;
+        changes[mode_count + 3 + k] = axis.cross(&arm);
+    }
+    changes[mode_count + 6] = arm;
+    bond.place - mean
+}
+
+/// Two directions at right angles to `normal` and to each other.
+fn tangents(normal: &Vector) -> [Vector; 2] {
+    let mut axis = Vector::zeros();
+    axis[normal.iamin()] = 1.0;
+    let t = normal.cross(&axis).normalize();
+    [t, normal.cross(&t)]
+}
+
 /// Rounds of the whole face; see [`shape_to`].
 const WHOLE: Fitting = Fitting {
-    mode_count: 60,
-    rounds: 16,
-    sigma: [3.0, 0.5],
+    mode_count: usize::MAX,
+    rounds: 24,
+    sigma: [3.0, 0.3],
     reach: [22.0, 8.0],
+    has_own_normals: true,
 };
 /// Vertices of the face that pull on the shape, at most.
 const PULLING_COUNT: usize = 1500;
@@ -302,7 +362,9 @@ pub(super) fn shape_to(model: &FaceModel<'_>, target: &Target, pins: &[Pin]) -> 
         let normal = target.surface.blend(&m.place, &target.normals);
         (!m.is_on_boundary).then_some((m.place.point, normal.try_normalize(0.0)?))
     };
-    let pulled = |fit: &IdentityFit, reach: f64| pulled_by(model, target, fit, 0.5 * reach);
+    let pulled = |shape: &[Point], normals: &[Vector], reach: f64| {
+        pulled_by(model, target, shape, normals, 0.5 * reach)
+    };
     fit_identity(
         model,
         &vertices,
@@ -316,12 +378,16 @@ pub(super) fn shape_to(model: &FaceModel<'_>, target: &Target, pins: &[Pin]) -> 
 }
 
 /// Vertices of the target with their closest places on the shape.
-fn pulled_by(model: &FaceModel<'_>, target: &Target, fit: &IdentityFit, reach: f64) -> Vec<Pulled> {
-    let vertices = fit.vertices(model);
-    let Ok(surface) = Surface::new(&vertices, &model.triangles) else {
+fn pulled_by(
+    model: &FaceModel<'_>,
+    target: &Target,
+    shape: &[Point],
+    normals: &[Vector],
+    reach: f64,
+) -> Vec<Pulled> {
+    let Ok(surface) = Surface::new(shape, &model.triangles) else {
         return Vec::new();
     };
-    let normals = vertex_normals(&vertices, &model.triangles);
     let stride = (target.positions.len() / PULLING_COUNT).max(1);
     let all: Vec<usize> = (0..target.positions.len()).step_by(stride).collect();
     let found: Vec<Pulled> = all
@@ -329,7 +395,7 @@ fn pulled_by(model: &FaceModel<'_>, target: &Target, fit: &IdentityFit, reach: f
         .filter_map(|&v| {
             let (p, n) = (target.positions[v], target.normals[v]);
             let at =
-                surface.closest_where(&p, reach, |at| surface.blend(at, &normals).dot(&n) > 0.5)?;
+                surface.closest_where(&p, reach, |at| surface.blend(at, normals).dot(&n) > 0.5)?;
             let corners = model.triangles[at.triangle as usize];
             (model.triangle_roles[at.triangle as usize] == Role::Face).then_some(Pulled {
                 corners: [0, 1, 2].map(|k| (corners[k], at.barycentric[k])),
@@ -374,7 +440,7 @@ mod tests {
                     .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.3)?;
                 Some((at.point, surface.blend(&at, &normals).normalize()))
             },
-            &|_, _| Vec::new(),
+            &|_, _, _| Vec::new(),
             &[],
             Similarity3::identity(),
             &Fitting {
@@ -382,6 +448,7 @@ mod tests {
                 rounds: 20,
                 sigma: [3.0, 0.3],
                 reach: [20.0, 6.0],
+                has_own_normals: true,
             },
         );
         let mut off: Vec<f64> = vertices

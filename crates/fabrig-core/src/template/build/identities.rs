@@ -1,11 +1,13 @@
 //! How people differ: principal components of the source's identity targets.
 //!
 //! An identity is taken for the template plus the sum of all targets, each weighted by a normal
-//! deviate of the recipe's standard deviation. The covariance of vertex positions is then known
-//! in closed form; its leading eigenvectors, made mirror symmetric and free of similarities,
-//! are the modes.
+//! deviate of the recipe's standard deviation. Targets of whole people are taken from the mixture
+//! of them that the template is, so that a person who is one of them all through lies along one
+//! such direction. The covariance of vertex positions is then known in closed form; its leading
+//! eigenvectors, free of similarities, are the modes: one set moves both sides alike, a smaller
+//! one is the difference between them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
@@ -16,6 +18,7 @@ use super::identity::{dense, symmetric_left};
 use super::source::{BaseMesh, read_body_target};
 use crate::Vector;
 use crate::atomic_file::write_atomically;
+use crate::template::description::Description;
 use crate::template::identity::{StoredModes, store_modes};
 use crate::template::{Template, TemplateError};
 
@@ -25,11 +28,37 @@ use crate::template::{Template, TemplateError};
 pub struct IdentityRecipe {
     neck_vertex: u32,
     millimetres_per_unit: f64,
-    modes: usize,
+    symmetric_modes: usize,
+    antisymmetric_modes: usize,
     outlying_regions: Vec<String>,
     outlying_weight: f64,
+    /// Targets that are left out.
+    held_out: BTreeSet<String>,
+    /// Standard deviation of the difference between left and right, in those of what they share.
+    sided: f64,
     folders: BTreeMap<String, f64>,
-    people: BTreeMap<String, f64>,
+    asymmetric: Asymmetric,
+    people: Vec<Kind>,
+}
+
+/// A folder of targets that differ from side to side, in mirrored pairs `-l` and `-r`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Asymmetric {
+    folder: String,
+    /// Standard deviation of what a pair shares.
+    symmetric: f64,
+    /// Standard deviation of its difference.
+    antisymmetric: f64,
+}
+
+/// Targets of whole people that stand for each other: their weights sum to one.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Kind {
+    /// Starts of their names.
+    starts: Vec<String>,
+    deviation: f64,
 }
 
 impl IdentityRecipe {
@@ -45,7 +74,14 @@ impl IdentityRecipe {
         })
     }
 
+    /// Names of the targets that are left out.
+    pub fn held_out(&self) -> impl Iterator<Item = &str> {
+        self.held_out.iter().map(String::as_str)
+    }
+
     /// Builds the modes from `data` and writes them as `identity.bin` is kept.
+    ///
+    /// - `description`: the text of the template's own `template.toml`
     ///
     /// # Errors
     ///
@@ -53,10 +89,16 @@ impl IdentityRecipe {
     pub fn write(
         &self,
         data: &Path,
+        description: &str,
         template: &Template,
         path: &Path,
     ) -> Result<(), TemplateError> {
-        let bytes = crate::template::geometry::pack(&self.stored(data, template)?)?;
+        let description = Description::parse(description)?;
+        let average = description
+            .build
+            .map(|build| build.identity)
+            .unwrap_or_default();
+        let bytes = crate::template::geometry::pack(&self.stored(data, &average, template)?)?;
         write_atomically(path, |file| file.write_all(&bytes)).map_err(|source| {
             TemplateError::Write {
                 path: path.to_owned(),
@@ -65,7 +107,12 @@ impl IdentityRecipe {
         })
     }
 
-    fn stored(&self, data: &Path, template: &Template) -> Result<StoredModes, TemplateError> {
+    fn stored(
+        &self,
+        data: &Path,
+        average: &BTreeMap<String, f64>,
+        template: &Template,
+    ) -> Result<StoredModes, TemplateError> {
         let base = BaseMesh::read(data)?;
         let head = crop_head(&base, self.neck_vertex)?;
         if head.source.len() != template.skin.vertex_count() {
@@ -73,42 +120,61 @@ impl IdentityRecipe {
                 reason: "the head is not cut where the template's is".to_owned(),
             });
         }
-        let deltas = |name: &str| -> Result<Vec<Vector>, TemplateError> {
+        let halves = |name: &str| -> Result<Halves, TemplateError> {
             let all = dense(name, &read_body_target(data, name)?, &base)?;
             let own: Vec<Vector> = head
                 .source
                 .iter()
                 .map(|&s| all[s as usize] * self.millimetres_per_unit)
                 .collect();
-            // A target of the left side alone stands for both.
-            let gain = if side_of(name).is_some() { 2.0 } else { 1.0 };
-            Ok(symmetric_left(&own, &own, &head.mirror)
-                .into_iter()
-                .map(|d| d * gain)
-                .collect())
+            let symmetric = symmetric_left(&own, &own, &head.mirror);
+            let antisymmetric = own.iter().zip(&symmetric).map(|(d, s)| d - s).collect();
+            Ok(Halves {
+                symmetric,
+                antisymmetric,
+            })
         };
-        let mut fields: Vec<Vec<Vector>> = Vec::new();
-        for (folder, deviation) in &self.folders {
-            for name in names(data, folder)? {
-                if side_of(&name) != Some('r') {
-                    fields.push(scaled(deltas(&format!("{folder}/{name}"))?, *deviation));
+        let mut shared: Vec<Vec<Vector>> = Vec::new();
+        let mut different: Vec<Vec<Vector>> = Vec::new();
+        for (folder, &deviation) in &self.folders {
+            for name in self.names(data, folder)? {
+                // A target of the left side stands for the right one's too.
+                match side_of(&name) {
+                    Some('r') => {}
+                    Some(_) => {
+                        let halves = halves(&name)?;
+                        shared.push(scaled(halves.symmetric, 2.0 * deviation));
+                        let of_difference = 2.0 * deviation * self.sided;
+                        different.push(scaled(halves.antisymmetric, of_difference));
+                    }
+                    None => shared.push(scaled(halves(&name)?.symmetric, deviation)),
                 }
             }
         }
-        let everybody = names(data, "macrodetails")?;
-        for (start, deviation) in &self.people {
-            let kind = everybody
-                .iter()
-                .filter(|n| n.starts_with(start.as_str()) && !n.contains("-baby"))
-                .map(|n| deltas(&format!("macrodetails/{n}")))
-                .collect::<Result<Vec<_>, _>>()?;
-            let share = 1.0 / kind.len().max(1) as f64;
-            let mean: Vec<Vector> = (0..head.source.len())
-                .map(|v| kind.iter().map(|k| k[v]).sum::<Vector>() * share)
-                .collect();
-            for one in kind {
-                let own = one.iter().zip(&mean).map(|(d, m)| d - m).collect();
-                fields.push(scaled(own, *deviation));
+        for name in self.names(data, &self.asymmetric.folder)? {
+            if name.ends_with("-l") {
+                let halves = halves(&name)?;
+                shared.push(scaled(halves.symmetric, self.asymmetric.symmetric));
+                different.push(scaled(halves.antisymmetric, self.asymmetric.antisymmetric));
+            }
+        }
+        for kind in &self.people {
+            let is_one = |name: &str| {
+                let own = name.rsplit('/').next().unwrap_or(name);
+                kind.starts.iter().any(|s| own.starts_with(s))
+            };
+            let mut mixture = vec![Vector::zeros(); head.source.len()];
+            for (name, &weight) in average.iter().filter(|(name, _)| is_one(name)) {
+                for (m, d) in mixture.iter_mut().zip(halves(name)?.symmetric) {
+                    *m += d * weight;
+                }
+            }
+            for name in self.names(data, "macrodetails")? {
+                if is_one(&name) && !name.contains("-baby") {
+                    let own = halves(&name)?.symmetric;
+                    let off = own.iter().zip(&mixture).map(|(d, m)| d - m).collect();
+                    shared.push(scaled(off, kind.deviation));
+                }
             }
         }
         let weights: Vec<f64> = template
@@ -125,14 +191,40 @@ impl IdentityRecipe {
                 }
             })
             .collect();
-        for field in &mut fields {
+        for field in shared.iter_mut().chain(&mut different) {
             without_similarity(template, &weights, field);
         }
         Ok(store_modes(
             &template.mirror,
-            &principal(&fields, &weights, self.modes),
+            &principal(&shared, &weights, self.symmetric_modes),
+            &principal(&different, &weights, self.antisymmetric_modes),
         ))
     }
+
+    /// Targets in a folder that are not held out, sorted, with the folder before their names.
+    fn names(&self, data: &Path, folder: &str) -> Result<Vec<String>, TemplateError> {
+        let path = data.join("mpfb2/targets").join(folder);
+        let failed = |source| TemplateError::Read {
+            path: path.clone(),
+            source,
+        };
+        let mut names = Vec::new();
+        for entry in std::fs::read_dir(&path).map_err(failed)? {
+            let name = entry.map_err(failed)?.file_name();
+            if let Some(stem) = name.to_str().and_then(|n| n.strip_suffix(".target.gz")) {
+                names.push(format!("{folder}/{stem}"));
+            }
+        }
+        names.retain(|name| !self.held_out.contains(name));
+        names.sort();
+        Ok(names)
+    }
+}
+
+/// A target's mirror symmetric part, and the rest. (mm)
+struct Halves {
+    symmetric: Vec<Vector>,
+    antisymmetric: Vec<Vector>,
 }
 
 /// Whether a target's name starts with a side.
@@ -145,24 +237,6 @@ fn side_of(name: &str) -> Option<char> {
 
 fn scaled(field: Vec<Vector>, by: f64) -> Vec<Vector> {
     field.into_iter().map(|d| d * by).collect()
-}
-
-/// Targets in a folder, sorted.
-fn names(data: &Path, folder: &str) -> Result<Vec<String>, TemplateError> {
-    let path = data.join("mpfb2/targets").join(folder);
-    let failed = |source| TemplateError::Read {
-        path: path.clone(),
-        source,
-    };
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(&path).map_err(failed)? {
-        let name = entry.map_err(failed)?.file_name();
-        if let Some(stem) = name.to_str().and_then(|n| n.strip_suffix(".target.gz")) {
-            names.push(stem.to_owned());
-        }
-    }
-    names.sort();
-    Ok(names)
 }
 
 /// Takes the least-squares shift, turn and change of size out of a field.
