@@ -1,9 +1,10 @@
 //! The quick cases of `fabrig bench registration`: known warps, remeshed, decimated, cut and
 //! mirrored faces come out within their bars, what is no face is refused.
 //!
-//! People in the template's topology miss the bars of known warps: where a chin or a cheek has
-//! slid along smooth skin is partly the artist's choice. One of them is held to what is reached,
-//! so that it cannot get worse unseen; the benchmark goes on to print it as missed.
+//! People in the template's topology miss the bar of the median: where a chin or a cheek has slid
+//! along smooth skin is known only as far as it goes with what can be seen. One of them is held to
+//! what is reached, so that it cannot get worse unseen; the benchmark goes on to print it as
+//! missed.
 
 use fabrig_core::registration::bench::{Outcome, cases, run_case};
 use fabrig_core::template::human;
@@ -19,7 +20,7 @@ fn the_quick_cases_pass() -> Result<(), fabrig_core::Error> {
             };
             let error = found.vertex_error;
             assert!(
-                error.median < 1.3 && error.p95 < 3.3 && found.folded_triangles == 0,
+                error.median < 0.95 && error.p95 < 2.5 && found.folded_triangles == 0,
                 "{}: {found:?}",
                 case.name
             );

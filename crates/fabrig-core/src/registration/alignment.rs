@@ -11,12 +11,12 @@
 //!    not look like a wrong place.
 //! 5. Confidence: the margin of the best over the best that differs from it.
 
-use nalgebra::{SMatrix, SVector, Similarity3, Translation3, Unit, UnitQuaternion};
+use nalgebra::{DVector, SMatrix, SVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
 
 use super::closest_grid::{ClosestGrid, Sample, sample_surface};
 use super::face_model::FaceModel;
-use super::identity_fit::{Fitting, fit_identity};
+use super::identity_fit::{Fitting, IdentityFit, fit_identity};
 use crate::mesh::Surface;
 use crate::{Point, Vector};
 
@@ -46,9 +46,11 @@ const FITTING: Fitting = Fitting {
 const UNLIKELY_MM: f64 = 0.01;
 
 /// A similarity that takes the mesh to the head frame, and how much it can be trusted.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Alignment {
     pub(super) to_head: Similarity3<f64>,
+    /// Coefficients of the leading identity modes with which the template fits there.
+    pub(super) coefficients: DVector<f64>,
     /// Mean capped distance of template face points. (mm)
     pub(super) residual_mm: f64,
     /// 1 - residual / residual of the best alignment that differs from this one.
@@ -140,19 +142,20 @@ pub(super) fn align(
             .into_iter()
             .skip(6),
     );
-    let mut fitted: Vec<Guess> = finalists
+    let mut fitted: Vec<(Guess, DVector<f64>)> = finalists
         .par_iter()
         .map(|g| fit(model, surface, &spread, g))
         .collect();
-    fitted.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let best = *fitted.first()?;
+    fitted.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
+    let (best, coefficients) = fitted.first()?.clone();
     let rival = fitted
         .iter()
-        .filter(|g| differs(&best.from_head, &g.from_head, 45.0, 25.0, 1.35))
-        .map(|g| g.score)
+        .filter(|(g, _)| differs(&best.from_head, &g.from_head, 45.0, 25.0, 1.35))
+        .map(|(g, _)| g.score)
         .fold(CUTOFF_MM, f64::min);
     Some(Alignment {
         to_head: best.from_head.inverse(),
+        coefficients,
         residual_mm: best.score,
         confidence: (1.0 - best.score / rival).clamp(0.0, 1.0),
     })
@@ -410,8 +413,15 @@ fn refine(
     }
 }
 
-/// A guess whose template is shaped like a person, judged by that shape.
-fn fit(model: &FaceModel<'_>, surface: &Surface, spread: &[(u32, f64)], guess: &Guess) -> Guess {
+/// A guess whose template is shaped like a person, judged by that shape, and the shape's
+/// coefficients.
+fn fit(
+    model: &FaceModel<'_>,
+    surface: &Surface,
+    spread: &[(u32, f64)],
+    guess: &Guess,
+) -> (Guess, DVector<f64>) {
+    let unshaped = (*guess, DVector::zeros(0));
     let from_head = guess.from_head;
     let to_head = from_head.inverse();
     let closest = |p: &Point, n: &Vector, reach: f64| {
@@ -430,12 +440,12 @@ fn fit(model: &FaceModel<'_>, surface: &Surface, spread: &[(u32, f64)], guess: &
         &closest,
         &|_, _, _| Vec::new(),
         &[],
-        Similarity3::identity(),
+        &IdentityFit::template(),
         &FITTING,
     );
     let ratio = shaped.similarity.scaling();
     if !(0.6..1.6).contains(&ratio) {
-        return *guess;
+        return unshaped;
     }
     // Back where the similarity takes them from.
     let own = shaped.similarity.inverse();
@@ -451,12 +461,10 @@ fn fit(model: &FaceModel<'_>, surface: &Surface, spread: &[(u32, f64)], guess: &
     let score =
         score(surface, &samples, &placed) + UNLIKELY_MM * shaped.coefficients.norm_squared();
     if score < guess.score {
-        Guess {
-            score,
-            from_head: placed,
-        }
+        let from_head = placed;
+        (Guess { score, from_head }, shaped.coefficients)
     } else {
-        *guess
+        unshaped
     }
 }
 

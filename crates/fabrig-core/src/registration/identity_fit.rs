@@ -68,6 +68,14 @@ pub(super) struct IdentityFit {
 }
 
 impl IdentityFit {
+    /// The template as it is.
+    pub(super) fn template() -> Self {
+        Self {
+            similarity: Similarity3::identity(),
+            coefficients: DVector::zeros(0),
+        }
+    }
+
     /// A vertex of the shape.
     pub(super) fn vertex(&self, model: &FaceModel<'_>, v: usize) -> Point {
         let mut p = model.positions()[v];
@@ -97,13 +105,16 @@ pub(super) fn fit_identity(
     closest: &Closest<'_>,
     pulled: &dyn Fn(&[Point], &[Vector], f64) -> Vec<Pulled>,
     pins: &[Pin],
-    start: Similarity3<f64>,
+    start: &IdentityFit,
     fitting: &Fitting,
 ) -> IdentityFit {
     let mode_count = fitting.mode_count.min(model.template.identity_modes.len());
     let mut fit = IdentityFit {
-        similarity: start,
-        coefficients: DVector::zeros(mode_count),
+        similarity: start.similarity,
+        coefficients: start
+            .coefficients
+            .clone()
+            .resize_vertically(mode_count, 0.0),
     };
     for round in 0..fitting.rounds {
         let share = round as f64 / (fitting.rounds.max(2) - 1) as f64;
@@ -339,7 +350,7 @@ fn tangents(normal: &Vector) -> [Vector; 2] {
 const WHOLE: Fitting = Fitting {
     mode_count: usize::MAX,
     rounds: 24,
-    sigma: [3.0, 0.3],
+    sigma: [6.0, 0.3],
     reach: [22.0, 8.0],
     has_own_normals: true,
 };
@@ -349,7 +360,13 @@ const PULLING_COUNT: usize = 1500;
 /// The template shaped like `target`, about where it stands in the head frame; see the module.
 ///
 /// - `pins`: places that are known
-pub(super) fn shape_to(model: &FaceModel<'_>, target: &Target, pins: &[Pin]) -> Vec<Point> {
+/// - `likely`: coefficients to start from
+pub(super) fn shape_to(
+    model: &FaceModel<'_>,
+    target: &Target,
+    pins: &[Pin],
+    likely: &DVector<f64>,
+) -> Vec<Point> {
     let areas = vertex_areas(model.positions(), &model.triangles);
     let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
     // Lips and lids have many small triangles and tell more than their area.
@@ -371,7 +388,10 @@ pub(super) fn shape_to(model: &FaceModel<'_>, target: &Target, pins: &[Pin]) -> 
         &closest,
         &pulled,
         pins,
-        Similarity3::identity(),
+        &IdentityFit {
+            similarity: Similarity3::identity(),
+            coefficients: likely.clone(),
+        },
         &WHOLE,
     )
     .vertices(model)
@@ -442,7 +462,7 @@ mod tests {
             },
             &|_, _, _| Vec::new(),
             &[],
-            Similarity3::identity(),
+            &IdentityFit::template(),
             &Fitting {
                 mode_count: 12,
                 rounds: 20,

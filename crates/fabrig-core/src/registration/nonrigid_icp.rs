@@ -10,7 +10,8 @@
 //! ```
 //!
 //! At rest every A_i is the identity. Any global affine map costs nothing, so size and
-//! proportions adapt before detail does.
+//! proportions adapt before detail does. Places u_i are the closest ones as far as the surface
+//! is across; along it they stay at g_i, where the identity fit has put them, but for pins.
 //!
 //! Source: Amberg, Romdhani & Vetter 2007, Optimal Step Nonrigid ICP Algorithms for Surface
 //! Registration; edge term after Sumner, Schmid & Pauly 2007, Embedded Deformation.
@@ -56,15 +57,9 @@ impl Pin {
 }
 
 /// Stiffness of each stage, and the largest angle between normals. (degrees)
-const STAGES: [(f64, f64); 7] = [
-    (400.0, 60.0),
-    (150.0, 60.0),
-    (60.0, 57.0),
-    (25.0, 54.0),
-    (10.0, 51.0),
-    (4.0, 48.0),
-    (1.5, 45.0),
-];
+const STAGES: [(f64, f64); 4] = [(25.0, 54.0), (10.0, 51.0), (4.0, 48.0), (1.5, 45.0)];
+/// How far away the first stage looks; later ones trust near matches only. (mm)
+const FIRST_REACH_MM: f64 = 10.0;
 const ROUNDS_PER_STAGE: usize = 3;
 /// Matches within this distance are never outliers. (mm)
 const MIN_LIMIT_MM: f64 = 8.0;
@@ -105,7 +100,8 @@ pub(super) fn deform_coarse(
     for (stage, (alpha, angle)) in STAGES.into_iter().enumerate() {
         for round in 0..ROUNDS_PER_STAGE {
             on_round((stage * ROUNDS_PER_STAGE + round) as f64 / total)?;
-            let data = node_matches(model, graph, target, &vertices, angle, stage);
+            let normals = vertex_normals(&vertices, &model.triangles);
+            let data = node_matches(model, graph, target, (&vertices, &normals), angle, stage);
             let values: Vec<f64> = stiffness.iter().map(|v| v * alpha).collect();
             system.set_values(&values);
             let mut rhs: Vec<f64> = stiffness_rhs.iter().map(|v| v * alpha).collect();
@@ -118,7 +114,9 @@ pub(super) fn deform_coarse(
                 }
             };
             for (node, weight, place) in data {
-                attract(node, weight, &place);
+                let n = normals[graph.nodes[node as usize] as usize];
+                let own = rest[node as usize];
+                attract(node, weight, &(own + n * n.dot(&(place - own))));
             }
             for pin in pins(&vertices, round == 0) {
                 // A pin moves the nodes around it by as much as it lacks.
@@ -188,14 +186,12 @@ fn node_matches(
     model: &FaceModel<'_>,
     graph: &NodeGraph,
     target: &Target,
-    vertices: &[Point],
+    (vertices, normals): (&[Point], &[Vector]),
     angle_degrees: f64,
     stage: usize,
 ) -> Vec<(u32, f64, Point)> {
-    let normals = vertex_normals(vertices, &model.triangles);
     let cos_limit = angle_degrees.to_radians().cos();
-    // Late stages trust near matches only.
-    let reach = 40.0 / (1.0 + stage as f64);
+    let reach = FIRST_REACH_MM / (1.0 + 0.25 * stage as f64);
     let found: Vec<(u32, f64, Point, f64)> = (0..graph.nodes.len())
         .into_par_iter()
         .filter_map(|k| {

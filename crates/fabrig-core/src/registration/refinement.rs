@@ -8,7 +8,8 @@
 //! ```
 //!
 //! with A the areas, u_i the face's closest place to vertex i, q_k vertices of the face and b
-//! their closest places on the template, L the cotangent Laplacian and M its lumped mass. The
+//! their closest places on the template (of both, what the surface is across: along it they are
+//! where the coarse result has them), L the cotangent Laplacian and M its lumped mass. The
 //! length l falls from round to round: what is finer than l stays as the template has it.
 //! Vertices without a counterpart follow by the last two terms alone.
 //!
@@ -77,7 +78,8 @@ pub(super) fn refine(
         for (v, weight, place) in vertex_matches(model, target, &vertices, &normals, cos_limit) {
             let weight = weight * energy.areas[v as usize];
             system.add(v, v, weight);
-            let d = place - start[v as usize];
+            let n = normals[v as usize];
+            let d = n * n.dot(&(place - start[v as usize]));
             for c in 0..3 {
                 rhs[c * count + v as usize] += weight * d[c];
             }
@@ -87,7 +89,11 @@ pub(super) fn refine(
             let at: Vector = (0..3)
                 .map(|k| start[corners[k] as usize].coords * pull.barycentric[k])
                 .sum();
-            let d = pull.place.coords - at;
+            let n = (0..3)
+                .map(|k| normals[corners[k] as usize] * pull.barycentric[k])
+                .sum::<Vector>();
+            // Blended normals are shorter than one.
+            let d = n * (n.dot(&(pull.place.coords - at)) / n.norm_squared());
             for i in 0..3 {
                 for j in 0..=i {
                     let value = pull.weight * pull.barycentric[i] * pull.barycentric[j];

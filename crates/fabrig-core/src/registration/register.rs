@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use nalgebra::{Similarity3, Translation3, UnitQuaternion};
+use nalgebra::{DVector, Similarity3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::alignment::align;
@@ -131,7 +131,12 @@ pub fn register(
     let target = target_of(&cleaned, start.piece, &start.to_head)?;
     let graph = NodeGraph::new(model.positions(), &model.topology, 1);
     let pins = Pins::new(&landmarks, &start.to_head);
-    let shaped = shape_to(&model, &target, &pins.at(&model, &[], 1.0));
+    let shaped = shape_to(
+        &model,
+        &target,
+        &pins.at(&model, &[], 1.0),
+        &start.coefficients,
+    );
     clock.finish("shape");
 
     clock.step("deform", 0.4)?;
@@ -162,6 +167,8 @@ pub fn register(
     )?;
     unfold(&model, &mut refined)?;
     settle_hidden(&model, &mut refined)?;
+    // What has settled turns the normals beside it.
+    unfold(&model, &mut refined)?;
     clock.finish("refine");
 
     clock.step("map", 0.9)?;
@@ -320,6 +327,8 @@ impl Clock<'_> {
 struct Start {
     piece: usize,
     to_head: Similarity3<f64>,
+    /// Coefficients of identity modes that fit there.
+    coefficients: DVector<f64>,
     confidence: f64,
     residual_mm: f64,
 }
@@ -369,6 +378,7 @@ fn align_face(
                 best = Some(Start {
                     piece: k,
                     to_head: found.to_head,
+                    coefficients: found.coefficients,
                     confidence: found.confidence,
                     residual_mm: found.residual_mm,
                 });
@@ -405,6 +415,7 @@ fn align_face(
         Start {
             piece: best.1,
             to_head,
+            coefficients: DVector::zeros(0),
             confidence: 1.0,
             residual_mm: landmark_rms(model, landmarks, &to_head),
         }

@@ -18,7 +18,7 @@ use crate::{Point, Vector};
 /// Skin within this many edges of a part tells how it moves as a whole.
 const SURROUNDING_RINGS: u32 = 4;
 /// A fold is smoothed over this many edges around it at most.
-const MAX_UNFOLD_RINGS: u32 = 3;
+const MAX_UNFOLD_RINGS: u32 = 6;
 
 /// Replaces the positions of hidden vertices.
 pub(super) fn settle_hidden(

@@ -34,7 +34,9 @@ pub enum Expectation {
     Refused,
 }
 
-/// Same people, whole, as they are or remeshed.
+/// People, whole, as they are or remeshed. None of the whole people that these are made of is
+/// among those that the identity modes were made from (see the pack's `identities.toml`); their
+/// local targets (a hump, a chin) come from the same source.
 const CLEAN: Bars = Bars {
     vertex: [0.7, 2.5],
     surface: [0.2, 0.8],
