@@ -58,6 +58,9 @@ pub(super) struct Pulled {
     pub(super) weight: f64,
 }
 
+/// What pulls on a shape with these vertices and normals, within a reach.
+pub(super) type Pulling<'a> = dyn Fn(&[Point], &[Vector], f64) -> Vec<Pulled> + 'a;
+
 /// A fitted shape.
 #[derive(Debug, Clone)]
 pub(super) struct IdentityFit {
@@ -103,7 +106,7 @@ pub(super) fn fit_identity(
     model: &FaceModel<'_>,
     vertices: &[(u32, f64)],
     closest: &Closest<'_>,
-    pulled: &dyn Fn(&[Point], &[Vector], f64) -> Vec<Pulled>,
+    pulled: &Pulling<'_>,
     pins: &[Pin],
     start: &IdentityFit,
     fitting: &Fitting,
