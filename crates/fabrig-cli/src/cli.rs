@@ -266,9 +266,12 @@ pub(crate) struct SceneArgs {
     /// Leave the cloth out: patches stand where the muscle shapes want them
     #[arg(long)]
     pub(crate) without_dynamics: bool,
-    /// Which patches collide
-    #[arg(long, value_enum, default_value_t = ContactPairs::None)]
-    pub(crate) contact: ContactPairs,
+    /// What is modelled, as TOML: `docs/scenes.md`; what else is given here goes before it
+    #[arg(long = "scene", value_name = "SCENE.toml")]
+    pub(crate) file: Option<PathBuf>,
+    /// Which patches collide [default: none]
+    #[arg(long, value_enum)]
+    pub(crate) contact: Option<ContactPairs>,
     /// Things that the face can touch: a TOML file of `colliders` tables
     #[arg(long, value_name = "COLLIDERS.toml")]
     pub(crate) colliders: Option<PathBuf>,
@@ -407,8 +410,23 @@ pub(crate) struct DemoArgs {
     /// Also keep the rig
     #[arg(long, value_name = "FACE.fabrig")]
     pub(crate) rig: Option<PathBuf>,
+    /// What is played
+    #[arg(long, value_enum, default_value_t = DemoScene::Performance)]
+    pub(crate) story: DemoScene,
+    /// Also draw the contact story into this folder
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) pictures: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+}
+
+/// What the demo plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DemoScene {
+    /// A performance of twelve seconds
+    Performance,
+    /// Lips that stick, a finger on the cheek, a ball on the forehead, blinks: contact is on
+    Contact,
 }
 
 /// A part of a face that a picture is framed on.

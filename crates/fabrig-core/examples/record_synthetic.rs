@@ -56,6 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             ball.len(),
             &triangles,
         )],
+        colliders: None,
         weight_names: vec!["jawOpen".to_owned(), "mouthSmileLeft".to_owned()],
         plotted_weights: Vec::new(),
         stat_names: vec!["stretch_energy".to_owned(), "step_ms".to_owned()],
@@ -84,6 +85,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             skin: &skin,
             patches: &patches,
             parts: &[&eye],
+            contact: None,
             strains: &[],
             head: Isometry3::rotation(Vector3::y() * 0.3 * f64::from((t * TAU * 0.4).sin())),
             weights: &[

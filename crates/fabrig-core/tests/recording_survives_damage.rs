@@ -44,6 +44,7 @@ fn info() -> RecordingInfo {
             vertex_colors: (0..SIDE * SIDE).map(|v| [v as u8, 9, 80, 255]).collect(),
             ..surface("eye_l", [240; 4])
         }],
+        colliders: None,
         weight_names: vec!["jawOpen".to_owned(), "mouthSmileLeft".to_owned()],
         plotted_weights: Vec::new(),
         stat_names: vec!["step_ms".to_owned()],
@@ -83,6 +84,7 @@ fn record(recorder: &mut McapRecorder, frames: u64) {
                 skin: &skin,
                 patches: &[&left, &right],
                 parts: &[&eye],
+                contact: None,
                 strains: &[],
                 head: head(k),
                 weights: &[0.0, 0.01 * k as f32],
@@ -172,6 +174,7 @@ fn strain_is_recorded_where_it_is_asked_for() {
         skin: &sheet,
         patches: &[&sheet, &sheet],
         parts: &[&sheet],
+        contact: None,
         strains: &[],
         head: Isometry3::identity(),
         weights: &[0.0, 0.0],
@@ -183,6 +186,7 @@ fn strain_is_recorded_where_it_is_asked_for() {
     assert!(refused.is_err_and(|e| e.to_string() == expected));
     let strains: [&[f32]; 2] = [&still, &still];
     let frame = Frame {
+        contact: None,
         strains: &strains,
         ..frame
     };
@@ -325,6 +329,7 @@ fn frames_that_do_not_fit_are_refused() {
         skin: &good,
         patches: &[&good, &good],
         parts: &[&good],
+        contact: None,
         strains: &[],
         head: Isometry3::identity(),
         weights: &[0.0, 0.0],

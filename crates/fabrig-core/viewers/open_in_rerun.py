@@ -26,6 +26,7 @@ WORLD = "world"
 HEAD = "head"
 SKIN, PARTS, PATCHES = "/rig/skin", "/rig/parts", "/rig/patches"
 STRAIN = "/rig/strain"
+COLLIDERS = "/colliders"
 POINTS = ["/points/skin", "/points/patches"]
 SURFACE = ".entities[].triangles[]"
 MESH = {
@@ -34,7 +35,13 @@ MESH = {
     "Mesh3D:vertex_normals": f"{SURFACE}.mesh_normals[] | pack(.x!, .y!, .z!)",
     "Mesh3D:vertex_colors": f"{SURFACE}.mesh_colors[]",
 }
-UNITS = {"_mm": "Distances (mm)", "_energy": "Energies", "_ms": "Times (ms)", "": "Counts"}
+UNITS = {
+    "_mm": "Distances (mm)",
+    "_newton": "Forces (N)",
+    "_energy": "Energies",
+    "_ms": "Times (ms)",
+    "": "Counts",
+}
 """What a plot of statistics is called, by the end of their names."""
 
 
@@ -58,7 +65,7 @@ def scene(name, topics):
         origin="/",
         name=name,
         contents=[*topics, "/tf"],
-        overrides={topic: mesh_overrides(topic) for topic in topics if topic.startswith("/rig")},
+        overrides={topic: mesh_overrides(topic) for topic in topics},
         spatial_information=rrb.SpatialInformation(target_frame=WORLD, show_axes=False),
         background=[34, 38, 43],
         line_grid=rrb.LineGrid3D(visible=False),
@@ -111,9 +118,10 @@ def blueprint(path):
         if fields:
             below.append(plot(title, "/stats", "fabrig.Stats:message", fields))
     below.append(rrb.TextLogView(origin="/log", name="Log"))
+    colliders = [COLLIDERS] if COLLIDERS in topics else []
     above = rrb.Horizontal(
-        scene("Skin", [SKIN, PARTS]),
-        scene("Muscles and fat", [PATCHES, PARTS]),
+        scene("Skin", [SKIN, PARTS, *colliders]),
+        scene("Muscles and fat", [PATCHES, PARTS, *colliders]),
         *([scene("Strain", [STRAIN, PARTS])] if STRAIN in topics else []),
         rrb.Spatial3DView(
             origin="/",

@@ -147,12 +147,13 @@ fn expression(name: String, vertices: &Bound<'_, PyAny>) -> PyResult<Expression>
 
 /// Simulates a rig through a take and records it to an MCAP file; returns a report.
 ///
+/// - `scene`: a mapping of the fields of a scene file; the other arguments go before it
 /// - `fps`: frames a second; the take's own by default
 /// - `gravity` (mm/s^2) and `wind` (mm/s): three numbers, world axes, +Y up
 /// - `progress`: called with ("simulate", share); raising or Ctrl-C ends the recording there,
 ///   whole and readable
 #[pyfunction]
-#[pyo3(signature = (rig, clip, output, *, fps=None, gravity=None, wind=None, substeps=None,
+#[pyo3(signature = (rig, clip, output, *, scene=None, fps=None, gravity=None, wind=None, substeps=None,
                     dynamics=true, progress=None))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn animate<'py>(
@@ -160,6 +161,7 @@ pub(crate) fn animate<'py>(
     rig: &PyRig,
     clip: &PyClip,
     output: PathBuf,
+    scene: Option<Bound<'py, PyAny>>,
     fps: Option<f64>,
     gravity: Option<Bound<'py, PyAny>>,
     wind: Option<Bound<'py, PyAny>>,
@@ -172,7 +174,13 @@ pub(crate) fn animate<'py>(
     {
         return Err(input(format!("fps: {fps} is not a frame rate")));
     }
-    let scene = scene(gravity.as_ref(), wind.as_ref(), substeps, dynamics)?;
+    let scene = self::scene(
+        scene.as_ref(),
+        gravity.as_ref(),
+        wind.as_ref(),
+        substeps,
+        dynamics,
+    )?;
     let options = AnimateOptions {
         fps,
         ..AnimateOptions::default()

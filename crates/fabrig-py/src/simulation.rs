@@ -2,24 +2,38 @@
 
 use std::sync::Arc;
 
-use fabrig_core::scene::{Dynamics, FacePose, Scene, Simulation};
+use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation};
+use nalgebra::{Isometry3, Vector3};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::errors::{input, to_py};
 use crate::motion::PyClip;
 use crate::rig::PyRig;
 
-/// A scene from keyword arguments.
+/// A scene from keyword arguments: a mapping of a scene's fields, then single ones over it.
 pub(crate) fn scene(
+    fields: Option<&Bound<'_, PyAny>>,
     gravity: Option<&Bound<'_, PyAny>>,
     wind: Option<&Bound<'_, PyAny>>,
     substeps: Option<u32>,
     dynamics: bool,
 ) -> PyResult<Scene> {
-    let mut scene = Scene::default();
+    let mut scene = match fields {
+        None => Scene::default(),
+        Some(fields) => {
+            let text: String = fields
+                .py()
+                .import("json")?
+                .call_method1("dumps", (fields,))
+                .map_err(|e| input(format!("scene: not made of plain values: {e}")))?
+                .extract()?;
+            Scene::from_json(&text).map_err(to_py)?
+        }
+    };
     if let Some(gravity) = gravity {
         scene.gravity = arrays::vector("gravity", gravity)?.into();
     }
@@ -45,18 +59,24 @@ pub(crate) struct PySimulation {
 #[pymethods]
 impl PySimulation {
     /// Puts a rig into a scene, at the first frame of a clip, or neutral without one.
+    ///
+    /// `scene` is a mapping of the fields of a scene file: `{"contact": {"pairs": "all"},
+    /// "colliders": [...]}`; the other arguments go before it.
     #[new]
-    #[pyo3(signature = (rig, clip=None, *, gravity=None, wind=None, substeps=None, dynamics=true))]
+    #[pyo3(signature = (rig, clip=None, *, scene=None, gravity=None, wind=None, substeps=None,
+                        dynamics=true))]
+    #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
     fn new(
         py: Python<'_>,
         rig: Py<PyRig>,
         clip: Option<&PyClip>,
+        scene: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
         wind: Option<&Bound<'_, PyAny>>,
         substeps: Option<u32>,
         dynamics: bool,
     ) -> PyResult<Self> {
-        let scene = scene(gravity, wind, substeps, dynamics)?;
+        let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
         let (shared, clip) = (Arc::clone(&rig.get().inner), clip.map(|c| c.inner.clone()));
         let inner = py
             .detach(|| Simulation::new(shared, scene, clip))
@@ -87,6 +107,66 @@ impl PySimulation {
             }
         };
         arrays::to_python(py, &report.map_err(to_py)?)
+    }
+
+    /// Says where a collider is at the end of the next step, in place of its keys: `position`
+    /// (mm) and `rotation`, an axis times an angle (rad), in the collider's own frame.
+    #[pyo3(signature = (name, position, *, rotation=None))]
+    fn set_collider(
+        &mut self,
+        name: &str,
+        position: &Bound<'_, PyAny>,
+        rotation: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let colliders = &self.inner.scene().colliders;
+        let Some(index) = colliders.iter().position(|c| c.name == name) else {
+            let known: Vec<&str> = colliders.iter().map(|c| c.name.as_str()).collect();
+            return Err(input(format!(
+                "name: there is no collider {name:?}; there are: {}",
+                known.join(", ")
+            )));
+        };
+        let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let position = wide(arrays::vector("position", position)?);
+        let rotation = rotation
+            .map(|r| arrays::vector("rotation", r))
+            .transpose()?
+            .map_or_else(Vector3::zeros, wide);
+        let pose = Isometry3::new(position, rotation);
+        self.inner
+            .set_collider_pose(index, pose)
+            .map_err(|e| to_py(SceneError::from(e)))
+    }
+
+    /// Force of the face on each collider at the end of the last step, by name: shape (3,), in
+    /// newtons of a face whose patches weigh the cloth's areal density, in the head frame.
+    #[getter]
+    fn collider_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let forces = PyDict::new(py);
+        let report = self.inner.contact_report();
+        let values = report.map_or(&[][..], |report| &report.forces);
+        for (collider, force) in self.inner.scene().colliders.iter().zip(values) {
+            let force: Vec<f64> = force.iter().copied().collect();
+            forces.set_item(&collider.name, force.into_pyarray(py))?;
+        }
+        Ok(forces)
+    }
+
+    /// What contact did in the last step, as a mapping; `None` where nothing could touch.
+    #[getter]
+    fn contact<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let report = self.inner.contact_report();
+        report
+            .map(|report| arrays::to_python(py, report))
+            .transpose()
+    }
+
+    /// Places that touch [mm, head frame], shape (K, 3).
+    #[getter]
+    fn contact_points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        let points = self.inner.contact_points().iter();
+        let points: Vec<_> = points.map(|point| point.position).collect();
+        arrays::from_points_f32(py, &points)
     }
 
     /// Time on the clip's axis (s).

@@ -7,7 +7,9 @@ use anyhow::{Context, Result};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::edit::{Edits, edits_path};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
-use fabrig_core::pipeline::{AnimateOptions, AnimateReport, TimeStatistics, animate};
+use fabrig_core::pipeline::{
+    AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate,
+};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{Dynamics, Scene};
 
@@ -26,7 +28,8 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
         take_name: stem(&args.motion),
         recording: args.scene.recording(),
     };
-    let report = record(console, rig, clip, &args.scene, &args.output, &options)?;
+    let scene = scene(&args.scene)?;
+    let report = record(console, rig, clip, scene, &args.output, &options)?;
     if args.scene.json {
         console.result(&serde_json::to_string_pretty(&report)?);
     } else {
@@ -82,35 +85,43 @@ pub(super) fn record(
     console: &Console,
     rig: Rig,
     clip: Clip,
-    args: &SceneArgs,
+    scene: Scene,
     output: &Path,
     options: &AnimateOptions,
 ) -> Result<AnimateReport> {
-    let report = animate(
-        Arc::new(rig),
-        clip,
-        scene(args)?,
-        output,
-        options,
-        &mut |now| {
-            let detail = format!("{}/{} frames", now.frame, now.frame_count);
-            console.show("simulate", now.frame, now.frame_count, &detail)
-        },
-    );
+    let report = animate(Arc::new(rig), clip, scene, output, options, &mut |now| {
+        let detail = format!("{}/{} frames", now.frame, now.frame_count);
+        console.show("simulate", now.frame, now.frame_count, &detail)
+    });
     console.clear();
     let report = report?;
     write_viewer_files(output, &report.foxglove_layout)?;
     Ok(report)
 }
 
-fn scene(args: &SceneArgs) -> Result<Scene> {
-    let mut scene = Scene::default();
-    scene.contact.pairs = match args.contact {
-        ContactPairs::None => PairMask::None,
-        ContactPairs::Sphincter => PairMask::Sphincter,
-        ContactPairs::All => PairMask::All,
+/// The scene that the arguments describe.
+pub(super) fn scene(args: &SceneArgs) -> Result<Scene> {
+    let mut scene = match &args.file {
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            Scene::from_toml(&text).with_context(|| format!("in {}", path.display()))?
+        }
+        None => Scene::default(),
     };
-    scene.contact.sticky_lips = args.sticky_lips.then(Stickiness::default);
+    if let Some(pairs) = args.contact {
+        scene.contact.pairs = match pairs {
+            ContactPairs::None => PairMask::None,
+            ContactPairs::Sphincter => PairMask::Sphincter,
+            ContactPairs::All => PairMask::All,
+        };
+    }
+    if args.sticky_lips {
+        scene
+            .contact
+            .sticky_lips
+            .get_or_insert_with(Stickiness::default);
+    }
     if let Some(path) = &args.colliders {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read {}", path.display()))?;
@@ -182,11 +193,59 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
         "from muscle shapes",
         format!("at most {:.2} mm rms in a frame", report.settle_rms_max),
     );
+    if let Some(contact) = &report.contact {
+        print_contact(&line, contact);
+    }
     line(
         "file",
         format!("{:.1} MB", report.recording.bytes as f64 / 1e6),
     );
     line("time", format!("{:.2} s", report.wall_secs));
+}
+
+fn print_contact(line: &impl Fn(&str, String), contact: &ContactSummary) {
+    line(
+        "contact",
+        format!(
+            "median {} of {} candidates touch, at most {}; {} steps cut short, {} pairs pinched",
+            contact.contacts_median,
+            contact.candidates_median,
+            contact.contacts_max,
+            contact.held,
+            contact.pinched
+        ),
+    );
+    if contact.bonds_max > 0 {
+        line(
+            "sticky lips",
+            format!(
+                "at most {} bonds, {} broke, the hardest pull {:.4} N",
+                contact.bonds_max, contact.broken_bonds, contact.bond_force_max
+            ),
+        );
+    }
+    line(
+        "skin in contact",
+        format!(
+            "at most {:.3} mm inside, {:.3} mm before it was corrected",
+            contact.skin_depth, contact.skin_depth_before
+        ),
+    );
+    if contact.started_inside > 0 {
+        line(
+            "started inside",
+            format!(
+                "{} nodes, the deepest {:.2} mm",
+                contact.started_inside, contact.started_depth
+            ),
+        );
+    }
+    for force in &contact.forces {
+        line(
+            "force",
+            format!("at most {:.3} N on {}", force.newtons, force.name),
+        );
+    }
 }
 
 /// What reading a take had to decide, for people.

@@ -1,16 +1,19 @@
 //! `fabrig demo`: the whole line with nothing but the binary.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
+use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions};
+use fabrig_core::scene::Scene;
 use fabrig_core::template;
 use serde_json::json;
 
-use super::animate::{outcome, print_report, record};
+use super::animate::{outcome, print_report, record, scene};
+use super::contact_pictures::draw;
 use super::rig;
 use super::viewers::print_how_to_open;
 use super::{Outcome, check_output};
-use crate::cli::DemoArgs;
+use crate::cli::{DemoArgs, DemoScene};
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
@@ -18,12 +21,17 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     if let Some(path) = &args.rig {
         check_output(path)?;
     }
+    let is_contact = args.story == DemoScene::Contact;
+    ensure!(
+        is_contact || args.pictures.is_none(),
+        "--pictures draws the contact story; add --story contact"
+    );
     let face = template::demo_face();
-    let clip = motion::parse(
-        template::demo_take(),
-        "the bundled take",
-        &ReadOptions::default(),
-    )?;
+    let (take, name) = match args.story {
+        DemoScene::Performance => (template::demo_take(), "demo"),
+        DemoScene::Contact => (template::demo_contact_take(), "contact"),
+    };
+    let clip = motion::parse(take, "the bundled take", &ReadOptions::default())?;
     let rigged = rig::rig(console, &face, &RigFaceOptions::default())?;
     if let Some(path) = &args.rig {
         rigged.rig.save(path)?;
@@ -35,18 +43,13 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     let options = AnimateOptions {
         fps: args.scene.fps,
         rig_name: "demo".to_owned(),
-        take_name: "demo".to_owned(),
+        take_name: name.to_owned(),
         recording: args.scene.recording(),
     };
     let registration = rigged.report;
-    let report = record(
-        console,
-        rigged.rig,
-        clip,
-        &args.scene,
-        &args.output,
-        &options,
-    )?;
+    let (positions, hinge) = (rigged.rig.positions.clone(), rigged.rig.jaw.hinge);
+    let scene = played_scene(args)?;
+    let report = record(console, rigged.rig, clip, scene, &args.output, &options)?;
     if args.scene.json {
         let both = json!({ "rig": registration, "animation": report });
         console.result(&serde_json::to_string_pretty(&both)?);
@@ -54,5 +57,26 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
         print_report(console, &report);
         print_how_to_open(console, &args.output);
     }
+    if let Some(folder) = &args.pictures {
+        draw(console, &args.output, folder, &positions, &hinge)?;
+    }
     Ok(outcome(console, &report))
+}
+
+/// The scene of the arguments; the contact story sets what they leave open.
+fn played_scene(args: &DemoArgs) -> Result<Scene> {
+    let mut scene = scene(&args.scene)?;
+    if args.story == DemoScene::Contact {
+        if args.scene.contact.is_none() && args.scene.file.is_none() {
+            scene.contact.pairs = PairMask::All;
+        }
+        scene
+            .contact
+            .sticky_lips
+            .get_or_insert_with(Stickiness::default);
+        if scene.colliders.is_empty() {
+            scene.colliders = read_colliders(template::demo_contact_colliders())?;
+        }
+    }
+    Ok(scene)
 }

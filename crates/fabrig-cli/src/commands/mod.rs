@@ -2,6 +2,7 @@
 
 mod animate;
 mod bench;
+mod contact_pictures;
 mod demo;
 mod edit;
 mod info;

@@ -1,7 +1,7 @@
 //! The skin as a place to lay patches on: smoothed normals, areas, thickness.
 
 use super::error::AnatomyError;
-use crate::mesh::{Surface, SurfacePoint, vertex_areas, vertex_normals};
+use crate::mesh::{Surface, SurfacePoint, triangle_edges, vertex_areas, vertex_normals};
 use crate::{Point, Vector};
 
 /// Rounds of averaging over neighbours that normals and areas go through: wide enough to pass
@@ -119,18 +119,6 @@ impl SkinFrame {
         self.surface
             .closest_where(point, reach, |place| accept(place.triangle))
     }
-}
-
-/// Every edge of the triangles once, lower vertex first.
-fn triangle_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
 }
 
 /// One round: every value becomes half itself, half the mean of its neighbours.

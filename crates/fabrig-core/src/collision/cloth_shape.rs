@@ -10,15 +10,21 @@ use parry3d::shape::{
     Ball, Capsule, ConvexPolyhedron, Cuboid, HalfSpace, Shape, TriMesh, TriMeshFlags,
 };
 
-use super::{ColliderShape, CollisionError};
+use super::{ColliderShape, CollisionError, StarSurface};
 use crate::{Point, Vector};
 
 /// Divisions around the mesh of a round shape.
 const AROUND: u32 = 20;
 
+/// What answers.
+enum Solid {
+    Parry(Box<dyn Shape>),
+    Star(StarSurface),
+}
+
 /// A shape with its mesh.
 pub(crate) struct WorldShape {
-    shape: Box<dyn Shape>,
+    solid: Solid,
     /// Whether its surface is smooth, so that nodes are held out of it one by one.
     pub(crate) is_round: bool,
     /// Vertices and triangles: its surface, for a round one inside it; empty for a plane.
@@ -119,17 +125,31 @@ impl WorldShape {
             ColliderShape::Ball { .. } | ColliderShape::Capsule { .. } | ColliderShape::Plane {}
         );
         Ok(Self {
-            shape,
+            solid: Solid::Parry(shape),
             is_round,
             mesh,
             radius,
         })
     }
 
+    /// A body of the face: smooth, without a mesh.
+    pub(crate) fn of_star(surface: StarSurface) -> Self {
+        Self {
+            is_round: true,
+            mesh: (Vec::new(), Vec::new()),
+            radius: surface.largest(),
+            solid: Solid::Star(surface),
+        }
+    }
+
     /// The surface nearest to a point in the shape's own coordinates. (mm)
     pub(crate) fn nearest(&self, point: &Vector) -> SurfacePlace {
+        let shape = match &self.solid {
+            Solid::Parry(shape) => shape,
+            Solid::Star(surface) => return surface.nearest(point),
+        };
         let asked = to_parry(point);
-        let found = self.shape.project_local_point(asked, false);
+        let found = shape.project_local_point(asked, false);
         let away = point
             - Vector::new(
                 f64::from(found.point.x),

@@ -6,9 +6,11 @@ use super::detect::PairList;
 use super::mesh::Part;
 use super::project::{Active, SmoothContact};
 use super::rules::Rules;
-use super::sticky::Bond;
+use super::sticky::{Bond, Lip};
 use super::world::WorldCollider;
-use super::{Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask};
+use super::{
+    Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
+};
 use crate::anatomy::GridShape;
 use crate::cloth::{HookSubstep, SubstepHook};
 
@@ -43,8 +45,12 @@ pub struct ContactPatch {
 /// A rigid body of the face itself that holds patches out: an eyeball, teeth and gums.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactBody {
-    /// The body as a collider in the head frame.
-    pub collider: Collider,
+    /// Its surface about its centre.
+    pub surface: StarSurface,
+    /// Coulomb's friction coefficient.
+    pub friction: f64,
+    /// Its pose at rest. [mm, head frame]
+    pub rest: Isometry3<f64>,
 }
 
 /// Contact of one cloth.
@@ -69,6 +75,9 @@ pub struct Contact {
     pub(super) node_mass: Vec<f64>,
     /// Rows of the mouth's ring that may stick: part and first node past them.
     pub(super) sticky: Option<(usize, u32)>,
+    /// For nodes of these rows their lip, and whether their skin touches the other.
+    pub(super) lip_of: Vec<Lip>,
+    pub(super) touching: Vec<Option<Lip>>,
     pub(super) positions: Vec<Point3<f32>>,
     pub(super) wanted: Vec<Point3<f32>>,
     pub(super) reference: Vec<Point3<f32>>,
@@ -147,7 +156,7 @@ impl Contact {
         for (index, body) in own.iter().enumerate() {
             let holds = |part: usize| patches[seen[part]].bodies.contains(&index);
             let held: Vec<usize> = (0..parts.len()).filter(|&p| holds(p)).collect();
-            let mut c = WorldCollider::new(&body.collider, index, held)?;
+            let mut c = WorldCollider::of_body(body, held);
             c.keep_rest_gaps(&parts, &rest, options.thickness);
             world.push(c);
         }
@@ -158,9 +167,8 @@ impl Contact {
         }
         let cloth_parts = parts.len();
         for (index, collider) in world.iter_mut().enumerate() {
-            // The face's own bodies are larger than cells, and planes have no mesh.
-            let has_mesh = !collider.shape.mesh.1.is_empty();
-            if !has_mesh || (index < body_count && collider.shape.is_round) {
+            // The face's own bodies are larger than cells and have no mesh, nor have planes.
+            if collider.shape.mesh.1.is_empty() {
                 continue;
             }
             let (vertices, triangles) = &collider.shape.mesh;
@@ -204,6 +212,8 @@ impl Contact {
             cover,
             node_mass,
             sticky,
+            lip_of: Vec::new(),
+            touching: Vec::new(),
             lists,
             world,
             body_count,
@@ -297,17 +307,20 @@ impl Contact {
         }
     }
 
-    fn longest_way(&self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
+    /// The longest way of anything in a substep (mm); marks the colliders that are away.
+    fn longest_way(&mut self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
         let mut squared = 0.0_f32;
         for (g, x) in goal.iter().zip(&self.positions) {
             squared = squared.max((g - x).norm_squared());
         }
         let mut furthest = f64::from(squared).sqrt();
-        for c in &self.world {
-            if c.shape.radius.is_finite() && !self.may_meet(c, progress) {
-                continue;
+        for index in 0..self.world.len() {
+            let c = &self.world[index];
+            let is_away = c.shape.radius.is_finite() && !self.may_meet(c, progress);
+            if !is_away {
+                furthest = furthest.max(c.way(progress));
             }
-            furthest = furthest.max(c.way(progress));
+            self.world[index].is_away = is_away;
         }
         furthest
     }

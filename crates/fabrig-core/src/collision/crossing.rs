@@ -65,18 +65,6 @@ pub fn crossings(
     found
 }
 
-/// The edges of a list of triangles, each once, rising.
-pub fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
-}
-
 fn snap(p: &Point3<f32>) -> [i64; 3] {
     [0, 1, 2].map(|k| (f64::from(p[k]).clamp(-LARGEST, LARGEST) * STEPS_PER_MM).round() as i64)
 }
@@ -241,7 +229,7 @@ mod tests {
             }
             triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
         }
-        let edges = edges_of(&triangles);
+        let edges = crate::mesh::triangle_edges(&triangles);
         let found = crossings(&positions, &edges, &triangles, |_, _| true);
         let lattice: Vec<_> = positions.iter().map(snap).collect();
         let mut expected = Vec::new();

@@ -70,7 +70,18 @@ impl Contact {
     pub(super) fn refresh_candidates(&mut self) {
         let mut stale = vec![false; self.parts.len()];
         let mut any = false;
+        for c in &self.world {
+            if let (true, Some(part)) = (c.is_away, c.part)
+                && self.budgets[part] >= 0.0
+            {
+                self.budgets[part] = -1.0;
+                any = true;
+            }
+        }
         for (index, part) in self.parts.iter().enumerate() {
+            if self.is_away(index) {
+                continue;
+            }
             let range = part.first as usize..(part.first + part.count) as usize;
             let mut squared = 0.0_f32;
             let reference = &self.reference[range.clone()];
@@ -102,11 +113,20 @@ impl Contact {
         let mut lists = std::mem::take(&mut self.lists);
         let mut cells = Vec::new();
         for list in &mut lists {
-            if stale[list.a] || stale[list.b] {
+            if self.is_away(list.b) {
+                list.candidates.clear();
+                list.spare = f32::INFINITY;
+            } else if stale[list.a] || stale[list.b] {
                 self.detect(list, &mut cells);
             }
         }
         self.lists = lists;
+    }
+
+    /// Whether a part is that of a collider which cannot meet anything now.
+    fn is_away(&self, part: usize) -> bool {
+        let own = self.world.iter().find(|c| c.part == Some(part));
+        own.is_some_and(|c| c.is_away)
     }
 
     fn renew(&mut self, index: usize) {
@@ -125,7 +145,7 @@ impl Contact {
         self.budgets[index] = (2.5 * furthest)
             .clamp(least, most)
             .max(1.01 * furthest + MARGIN as f32);
-        part.tree.refit(&part.cells, &self.reference);
+        part.refit(&self.reference);
     }
 
     /// How much two elements keep apart at most, over a whole list. (mm)
@@ -142,6 +162,10 @@ impl Contact {
 
     fn detect(&self, list: &mut PairList, cells: &mut Vec<[u32; 2]>) {
         list.candidates.clear();
+        if list.a == list.b && self.parts[list.a].is_flat() {
+            list.spare = f32::INFINITY;
+            return;
+        }
         let (a, b) = (&self.parts[list.a], &self.parts[list.b]);
         let slack = f64::from(self.budgets[list.a] + self.budgets[list.b]) + 2.0 * MARGIN;
         let reach = self.thickest(list) + slack;
@@ -156,10 +180,6 @@ impl Contact {
         let (out, spare) = (&mut list.candidates, &mut list.spare);
         *spare = f32::INFINITY;
         let mut offer = |kind: PairKind, nodes: [u32; 4]| {
-            let (first, second) = nodes.split_at(kind.first_count());
-            if own && self.rules.side(a, first, second) != Side::Apart {
-                return;
-            }
             let at = nodes.map(|n| wide(&self.reference[n as usize]));
             let thickness = if is_cloth {
                 self.options.thickness
@@ -170,6 +190,10 @@ impl Contact {
             };
             let limit = thickness + slack;
             if boxes_apart(kind, &at, limit) {
+                return;
+            }
+            let (first, second) = nodes.split_at(kind.first_count());
+            if own && self.rules.side(a, first, second) != Side::Apart {
                 return;
             }
             let distance = weighted(&closest_weights(kind, &at), &at).norm();
@@ -190,6 +214,11 @@ impl Contact {
             });
         };
         for &[ca, cb] in cells.iter() {
+            if own && a.are_next_cells(ca, cb)
+                || a.are_apart(ca, b, cb, reach as f32, &self.reference)
+            {
+                continue;
+            }
             let (ca, cb) = (&a.cells[ca as usize], &b.cells[cb as usize]);
             for &v in &ca.nodes {
                 for &[x, y, z] in &cb.triangles {

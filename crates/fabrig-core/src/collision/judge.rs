@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::contact::Contact;
-use super::crossing::{crossings, edges_of};
+use super::crossing::crossings;
 use super::{Collider, CollisionError, collider_mesh};
+use crate::mesh::triangle_edges;
 
 /// Crossings among everything that may collide.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -51,7 +52,7 @@ impl Contact {
             triangles.extend(own.iter().map(|t| t.map(|v| v + first)));
             owner.resize(points.len(), cloth + index);
         }
-        let edges = edges_of(&triangles);
+        let edges = triangle_edges(&triangles);
         let mut verdict = Verdict::default();
         let found = crossings(&points, &edges, &triangles, |e, t| {
             let (a, b) = (

@@ -16,6 +16,7 @@
 //! - `project`: contacts as planes, Coulomb friction; `sticky`: bonds between lips
 //! - `filter`: conservative advancement, the guarantee that nothing crosses
 //! - `collider`, `world`, `cloth_shape`: things of the world; the last one speaks parry
+//! - [`StarSurface`]: bodies of the face itself; [`Sheet`]: skin that others stay in front of
 //! - [`crossings`]: an exact test that shares nothing with the rest, to judge it by
 //!
 //! Everything runs in one fixed order on one thread: results do not depend on how many threads
@@ -40,6 +41,8 @@ mod options;
 mod project;
 mod report;
 mod rules;
+mod sheet;
+mod star;
 mod sticky;
 mod tree;
 mod world;
@@ -49,9 +52,14 @@ mod tests;
 
 pub use collider::{Collider, ColliderFrame, ColliderKey, ColliderShape, read_colliders};
 pub use contact::{Contact, ContactBody, ContactPatch};
-pub use crossing::{Crossing, crossings, edges_of};
+pub use crossing::{Crossing, crossings};
 pub use error::CollisionError;
 pub use judge::Verdict;
 pub use options::{ContactOptions, PairMask, Stickiness};
 pub use report::{ContactPoint, ContactReport};
+pub use sheet::{Sheet, SheetPlace};
+pub use star::StarSurface;
+pub use sticky::Lip;
 pub use world::collider_mesh;
+
+pub(crate) use cloth_shape::WorldShape;

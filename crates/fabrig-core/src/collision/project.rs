@@ -70,7 +70,7 @@ impl Contact {
     pub(super) fn collect_smooth(&mut self) {
         self.smooth.clear();
         for (index, c) in self.world.iter().enumerate() {
-            if !c.shape.is_round {
+            if !c.shape.is_round || c.is_away {
                 continue;
             }
             let inverse = c.pose.inverse();
@@ -150,11 +150,7 @@ impl Contact {
         }
         for s in &smooth {
             if s.push > 0.0 {
-                let friction = if (s.collider as usize) < self.body_count {
-                    self.options.eye_friction
-                } else {
-                    self.world[s.collider as usize].friction
-                };
+                let friction = self.world[s.collider as usize].friction;
                 let i = s.node as usize;
                 let x = wide(&self.wanted[i]);
                 let slip = x - wide(&self.positions[i]) - s.carried;

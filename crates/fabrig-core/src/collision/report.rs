@@ -29,6 +29,8 @@ pub struct ContactReport {
     pub bonds: usize,
     /// Bonds that broke in the frame.
     pub broken_bonds: usize,
+    /// Hardest that a bond pulled in the frame. (N)
+    pub bond_force: f64,
     /// Times that the candidates of a patch were found anew.
     pub detections: usize,
     /// Steps that were cut short, so that nothing crossed.

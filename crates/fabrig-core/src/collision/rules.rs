@@ -10,10 +10,11 @@
 
 use nalgebra::Point3;
 
-use super::crossing::{crossings, edges_of};
+use super::crossing::crossings;
 use super::judge::Side;
 use super::mesh::Part;
 use super::{ContactPatch, PairMask};
+use crate::mesh::triangle_edges;
 
 /// What may collide with what.
 #[derive(Debug, Clone, Default)]
@@ -46,7 +47,7 @@ impl Rules {
             owner[part.first as usize..(part.first + part.count) as usize].fill(index);
             triangles.extend(part.triangles());
         }
-        let edges = edges_of(&triangles);
+        let edges = triangle_edges(&triangles);
         let mut crossed = Vec::new();
         for c in crossings(rest, &edges, &triangles, |_, _| true) {
             let (edge, triangle) = (edges[c.edge as usize], triangles[c.triangle as usize]);

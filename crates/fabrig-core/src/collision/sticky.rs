@@ -1,9 +1,10 @@
 //! Lips that stick.
 //!
 //! A bond holds a node of one lip to a place on the other, no further away than they were when
-//! it formed. It forms where lips come within a gap, and breaks when it has to pull harder
-//! than its strength or is drawn longer than a larger gap: between forming and breaking lies
-//! the hysteresis. As the jaw opens, bonds break where the pull is largest, and the lips peel.
+//! it formed. It forms where the skin of the lips touches, which is told by who moves the skin:
+//! the patches lie some millimetres inside. It breaks when it has to pull harder than its
+//! strength or is drawn longer than a larger gap: between forming and breaking lies the
+//! hysteresis. As the jaw opens, bonds break where the pull is largest, and the lips peel.
 
 use super::contact::Contact;
 use super::distance::{PairKind, closest_weights, weighted, wide};
@@ -21,7 +22,36 @@ pub(crate) struct Bond {
     is_broken: bool,
 }
 
+/// One of the two lips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lip {
+    /// The upper one.
+    Upper,
+    /// The lower one.
+    Lower,
+}
+
 impl Contact {
+    /// Which lip each node of the ring that may stick belongs to: those of its first
+    /// [`Stickiness::rows`](super::Stickiness::rows) rows, row after row.
+    pub fn set_lips(&mut self, lip_of: &[Lip]) {
+        let Some((part, past)) = self.sticky else {
+            return;
+        };
+        let count = (past - self.parts[part].first) as usize;
+        self.lip_of = lip_of.iter().copied().take(count).collect();
+        self.touching = vec![None; self.lip_of.len()];
+    }
+
+    /// Says at which of these nodes the skin of the lips touches now: there bonds form.
+    pub fn set_touching(&mut self, is_touching: impl IntoIterator<Item = bool>) {
+        for ((slot, lip), is_touching) in
+            self.touching.iter_mut().zip(&self.lip_of).zip(is_touching)
+        {
+            *slot = is_touching.then_some(*lip);
+        }
+    }
+
     /// One sweep over all bonds; those that are overstretched break.
     pub(super) fn pull_bonds(&mut self, force_per_shift: f64) {
         let Some(sticky) = self.options.sticky_lips else {
@@ -46,7 +76,9 @@ impl Contact {
             let sum: f64 = bond.weights.iter().map(|w| w * w).sum();
             let force_of = self.node_mass[bond.nodes[0] as usize] * force_per_shift / sum;
             bond.pull += excess;
-            if bond.pull * force_of > sticky.strength {
+            let force = bond.pull * force_of;
+            self.report.bond_force = self.report.bond_force.max(force);
+            if force > sticky.strength {
                 bond.is_broken = true;
                 continue;
             }
@@ -60,53 +92,46 @@ impl Contact {
 
     /// At the end of a frame: forgets broken bonds and forms new ones.
     pub(super) fn form_bonds(&mut self) {
-        let Some(sticky) = self.options.sticky_lips else {
-            return;
-        };
         let before = self.bonds.len();
         self.bonds.retain(|b| !b.is_broken);
         self.report.broken_bonds += before - self.bonds.len();
         let Some((part, past)) = self.sticky else {
             return;
         };
-        let mut taken: Vec<bool> = vec![false; past as usize];
-        for b in &self.bonds {
-            taken[b.nodes[0] as usize] = true;
-        }
         let first = self.parts[part].first;
-        let is_lip = |n: u32| n >= first && n < past;
-        // The nearest place for each node.
-        let mut best: std::collections::BTreeMap<u32, (f64, Bond)> = Default::default();
-        for list in self.lists.iter().filter(|l| l.a == part && l.b == part) {
-            for c in &list.candidates {
-                if c.kind != PairKind::VertexTriangle
-                    || !c.nodes.iter().all(|&n| is_lip(n))
-                    || taken[c.nodes[0] as usize]
-                {
-                    continue;
-                }
-                let x = c.nodes.map(|n| wide(&self.positions[n as usize]));
-                let weights = closest_weights(c.kind, &x);
-                let distance = weighted(&weights, &x).norm();
-                if distance > f64::from(c.thickness) + sticky.gap {
-                    continue;
-                }
-                let bond = Bond {
-                    nodes: c.nodes,
+        let mut is_taken = vec![false; (past - first) as usize];
+        for b in &self.bonds {
+            is_taken[(b.nodes[0] - first) as usize] = true;
+        }
+        let triangles: Vec<[u32; 3]> = self.parts[part]
+            .triangles()
+            .filter(|t| t.iter().all(|&n| n < past))
+            .collect();
+        for (slot, lip) in self.touching.iter().enumerate() {
+            let (Some(lip), false) = (lip, is_taken[slot]) else {
+                continue;
+            };
+            // The nearest place on the other lip.
+            let node = first + slot as u32;
+            let is_other = |n: u32| self.lip_of[(n - first) as usize] != *lip;
+            let places = triangles.iter().filter(|t| t.iter().all(|&n| is_other(n)));
+            let places = places.map(|&[a, b, c]| {
+                let nodes = [node, a, b, c];
+                let x = nodes.map(|n| wide(&self.positions[n as usize]));
+                let weights = closest_weights(PairKind::VertexTriangle, &x);
+                (weighted(&weights, &x).norm(), nodes, weights)
+            });
+            let nearest = places.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((length, nodes, weights)) = nearest {
+                self.bonds.push(Bond {
+                    nodes,
                     weights,
-                    length: distance,
+                    length,
                     pull: 0.0,
                     is_broken: false,
-                };
-                match best.get(&c.nodes[0]) {
-                    Some((d, _)) if *d <= distance => {}
-                    _ => {
-                        best.insert(c.nodes[0], (distance, bond));
-                    }
-                }
+                });
             }
         }
-        self.bonds.extend(best.into_values().map(|(_, b)| b));
         self.report.bonds = self.bonds.len();
     }
 }

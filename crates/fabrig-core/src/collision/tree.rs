@@ -130,10 +130,26 @@ impl Tree {
     /// Pairs of cells of two trees whose boxes are within `reach` of each other.
     pub(crate) fn near_cells(&self, other: &Self, reach: f32, out: &mut Vec<[u32; 2]>) {
         out.clear();
-        if self.nodes.is_empty() || other.nodes.is_empty() {
-            return;
+        if !self.nodes.is_empty() && !other.nodes.is_empty() {
+            self.descend(other, [0, 0], reach, out);
         }
-        let mut stack = vec![[0_u32, 0_u32]];
+    }
+
+    /// Pairs of cells of this tree whose boxes are within `reach`, each once.
+    pub(crate) fn near_own_cells(&self, reach: f32, out: &mut Vec<[u32; 2]>) {
+        out.clear();
+        for node in &self.nodes {
+            if let [l, r] = node.children
+                && r != LEAF
+            {
+                self.descend(self, [l, r], reach, out);
+            }
+        }
+    }
+
+    /// Pairs of cells under two nodes, one of each tree, whose boxes are within `reach`.
+    fn descend(&self, other: &Self, start: [u32; 2], reach: f32, out: &mut Vec<[u32; 2]>) {
+        let mut stack = vec![start];
         while let Some([a, b]) = stack.pop() {
             let (na, nb) = (&self.nodes[a as usize], &other.nodes[b as usize]);
             if !are_near(na, nb, reach) {
@@ -154,39 +170,51 @@ impl Tree {
         }
     }
 
-    /// Pairs of cells of this tree whose boxes are within `reach`, each once.
-    pub(crate) fn near_own_cells(&self, reach: f32, out: &mut Vec<[u32; 2]>) {
-        out.clear();
-        if self.nodes.is_empty() {
-            return;
+    /// The cell nearest to a point within `reach`: `measure` gives the distance of a cell, or
+    /// nothing for one that does not count, and what to return with it.
+    pub(crate) fn nearest_cell<T>(
+        &self,
+        point: &Point3<f32>,
+        reach: f32,
+        mut measure: impl FnMut(u32) -> Option<(f32, T)>,
+    ) -> Option<(f32, T)> {
+        let mut best: Option<(f32, T)> = None;
+        let mut limit = reach;
+        let mut stack = Vec::new();
+        if let Some(root) = self.nodes.first() {
+            stack.push((outside(root, point), 0_u32));
         }
-        let mut stack = vec![[0_u32, 0_u32]];
-        while let Some([a, b]) = stack.pop() {
-            let (na, nb) = (&self.nodes[a as usize], &self.nodes[b as usize]);
-            if a == b {
-                if na.children[1] != LEAF {
-                    let [l, r] = na.children;
-                    stack.extend([[l, l], [r, r], [l, r]]);
+        while let Some((distance, index)) = stack.pop() {
+            if distance > limit {
+                continue;
+            }
+            let [a, b] = self.nodes[index as usize].children;
+            if b == LEAF {
+                if let Some(found) = measure(a)
+                    && (found.0 < limit || (best.is_none() && found.0 <= limit))
+                {
+                    limit = found.0;
+                    best = Some(found);
                 }
                 continue;
             }
-            if !are_near(na, nb, reach) {
-                continue;
-            }
-            match (na.children[1] == LEAF, nb.children[1] == LEAF) {
-                (true, true) => out.push([na.children[0], nb.children[0]]),
-                (true, false) => nb.children.iter().for_each(|&c| stack.push([a, c])),
-                (false, true) => na.children.iter().for_each(|&c| stack.push([c, b])),
-                (false, false) => {
-                    if size(na) >= size(nb) {
-                        na.children.iter().for_each(|&c| stack.push([c, b]));
-                    } else {
-                        nb.children.iter().for_each(|&c| stack.push([a, c]));
-                    }
-                }
-            }
+            let of = |child: u32| (outside(&self.nodes[child as usize], point), child);
+            let (a, b) = (of(a), of(b));
+            // The nearer one is looked at first.
+            let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+            stack.extend([far, near]);
         }
+        best
     }
+}
+
+/// Distance from a point to a box, zero inside.
+#[inline]
+fn outside(n: &Node, p: &Point3<f32>) -> f32 {
+    let squared: f32 = (0..3)
+        .map(|k| (n.low[k] - p[k]).max(p[k] - n.high[k]).max(0.0).powi(2))
+        .sum();
+    squared.sqrt()
 }
 
 #[inline]

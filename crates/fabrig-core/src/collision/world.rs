@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Translation3};
 
 use super::cloth_shape::WorldShape;
 use super::collider::between;
-use super::contact::{Contact, PASS_LENGTH};
+use super::contact::{Contact, ContactBody, PASS_LENGTH};
 use super::mesh::Part;
 use super::{Collider, CollisionError};
 use crate::{Point, Vector};
@@ -18,6 +18,8 @@ pub(super) struct WorldCollider {
     pub(super) held: Vec<usize>,
     /// Its own part, if it has a mesh.
     pub(super) part: Option<usize>,
+    /// Whether it cannot meet anything in this substep.
+    pub(super) is_away: bool,
     /// For each node of the held parts, one after the other, the distance it must keep (mm);
     /// empty: what covers the node.
     pub(super) gaps: Vec<f32>,
@@ -36,18 +38,29 @@ impl WorldCollider {
         held: Vec<usize>,
     ) -> Result<Self, CollisionError> {
         collider.check(index)?;
+        let shape = WorldShape::new(&collider.shape, index, &collider.name)?;
         let pose = collider.pose_at(f64::NEG_INFINITY);
-        Ok(Self {
-            shape: WorldShape::new(&collider.shape, index, &collider.name)?,
-            friction: collider.friction,
+        Ok(Self::placed(shape, collider.friction, pose, held))
+    }
+
+    pub(super) fn of_body(body: &ContactBody, held: Vec<usize>) -> Self {
+        let shape = WorldShape::of_star(body.surface.clone());
+        Self::placed(shape, body.friction, body.rest, held)
+    }
+
+    fn placed(shape: WorldShape, friction: f64, pose: Isometry3<f64>, held: Vec<usize>) -> Self {
+        Self {
+            shape,
+            friction,
             held,
             part: None,
+            is_away: false,
             gaps: Vec::new(),
             pose,
             pose_before: pose,
             start: pose,
             end: pose,
-        })
+        }
     }
 
     /// Keeps nodes as far away as they are at rest, but no further than `thickness` asks. (mm)
@@ -124,6 +137,9 @@ impl Contact {
             let first = self.parts[part].first as usize;
             for (k, p) in c.shape.mesh.0.iter().enumerate() {
                 self.wanted[first + k] = (c.pose * p).cast();
+                if c.is_away {
+                    self.positions[first + k] = self.wanted[first + k];
+                }
             }
         }
     }
@@ -142,32 +158,13 @@ impl Contact {
         );
         let center = (low + high) * 0.5;
         let size = (high - low).norm() * 0.5;
+        let ways: Vec<[Isometry3<f64>; 2]> = self.world.iter().map(|c| [c.start, c.end]).collect();
+        for c in &mut self.world {
+            (c.start, c.end) = (c.pose, c.pose);
+        }
         for &index in which {
-            let c = &self.world[index];
-            let end = c.end;
-            let (mut inside, mut deepest) = (0, 0.0_f64);
-            for p in goal {
-                let local = end.inverse() * p.cast::<f64>();
-                let distance = c.shape.nearest(&local.coords).distance;
-                if distance < 0.0 {
-                    inside += 1;
-                    deepest = deepest.max(-distance);
-                }
-            }
-            self.report.started_inside += inside;
-            self.report.started_depth = self.report.started_depth.max(deepest);
-            let out = if c.shape.radius.is_finite() {
-                let away = end.translation.vector - center;
-                let direction = away.try_normalize(1e-9).unwrap_or_else(Vector::z);
-                let far = size + c.shape.radius + 20.0;
-                direction * (far - away.norm()).max(0.0)
-            } else {
-                end.rotation * Vector::y() * -(2.0 * size + 20.0)
-            };
-            let outside = Isometry3::from_parts(
-                Translation3::from(end.translation.vector + out),
-                end.rotation,
-            );
+            self.note_inside(index, &ways[index][1], goal);
+            let outside = outside(&self.world[index].shape, &ways[index][1], &center, size);
             let c = &mut self.world[index];
             (c.start, c.end, c.pose) = (outside, outside, outside);
             if let Some(part) = c.part {
@@ -178,17 +175,55 @@ impl Contact {
                 }
                 self.budgets[part] = -1.0;
             }
-            self.world[index].start = outside;
-            self.world[index].end = end;
+        }
+        for &index in which {
+            self.world[index].end = ways[index][1];
             let way = self.world[index].way([0.0, 1.0]);
             let steps = (way / (64.0 * PASS_LENGTH)).ceil().max(1.0) as usize;
             for step in 0..steps {
                 let progress = [step, step + 1].map(|i| i as f64 / steps as f64);
                 self.resolve(goal, progress, 0.0);
             }
-            self.world[index].start = end;
+            self.world[index].start = ways[index][1];
+        }
+        for (index, (c, [start, end])) in self.world.iter_mut().zip(ways).enumerate() {
+            if !which.contains(&index) {
+                (c.start, c.end) = (start, end);
+            }
         }
     }
+
+    /// Counts the nodes that a collider at a pose would have inside.
+    fn note_inside(&mut self, index: usize, pose: &Isometry3<f64>, goal: &[Point3<f32>]) {
+        let shape = &self.world[index].shape;
+        let (mut inside, mut deepest) = (0, 0.0_f64);
+        for p in goal {
+            let local = pose.inverse() * p.cast::<f64>();
+            let distance = shape.nearest(&local.coords).distance;
+            if distance < 0.0 {
+                inside += 1;
+                deepest = deepest.max(-distance);
+            }
+        }
+        self.report.started_inside += inside;
+        self.report.started_depth = self.report.started_depth.max(deepest);
+    }
+}
+
+/// A pose from which a collider comes in without having touched anything.
+fn outside(shape: &WorldShape, end: &Isometry3<f64>, center: &Vector, size: f64) -> Isometry3<f64> {
+    let out = if shape.radius.is_finite() {
+        let away = end.translation.vector - center;
+        let direction = away.try_normalize(1e-9).unwrap_or_else(Vector::z);
+        let far = size + shape.radius + 20.0;
+        direction * (far - away.norm()).max(0.0)
+    } else {
+        end.rotation * Vector::y() * -(2.0 * size + 20.0)
+    };
+    Isometry3::from_parts(
+        Translation3::from(end.translation.vector + out),
+        end.rotation,
+    )
 }
 
 /// Corners of the mesh of a collider at a pose, for showing and judging. [mm, head frame]

@@ -17,4 +17,4 @@ pub use polygon_mesh::{CornerUvs, FaceGroup, Mesh, MeshError, Polygons};
 pub use self_intersection::self_intersections;
 pub use slit::{SlitField, SlitMesh, VertexOrigin, slit};
 pub use surface::{RayHit, Surface, SurfaceError, SurfacePoint, closest_on_triangle};
-pub use topology::{Edge, Topology};
+pub use topology::{Edge, Topology, triangle_edges};

@@ -16,6 +16,18 @@ pub struct Edge {
     pub has_flip: bool,
 }
 
+/// Every edge of some triangles once, lower vertex first, rising.
+pub fn triangle_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
 /// Edges, neighbours and boundary loops.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topology {

@@ -9,14 +9,15 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::TimeStatistics;
+use super::contact::{ContactLog, ContactSummary, collider_surfaces, stat_names};
 use super::strain::fibre_strain;
 use crate::Error;
 use crate::Vector;
 use crate::cloth::Counters;
 use crate::motion::{Clip, ClipNotes};
 use crate::recording::{
-    Frame, LogEvent, LogLevel, McapRecorder, RecordingInfo, RecordingOptions, RecordingReport,
-    SurfaceInfo, foxglove_layout,
+    ContactFrame, Frame, LogEvent, LogLevel, McapRecorder, RecordingInfo, RecordingOptions,
+    RecordingReport, SurfaceInfo, foxglove_layout,
 };
 use crate::rig::Rig;
 use crate::scene::{FrameReport, Scene, Simulation};
@@ -81,6 +82,8 @@ pub struct AnimateReport {
     pub guards: Counters,
     /// Largest root mean square distance of a frame's nodes from their muscle shapes. (mm)
     pub settle_rms_max: f64,
+    /// What contact did; none where nothing could touch.
+    pub contact: Option<ContactSummary>,
     /// What reading the take had to decide.
     pub take: ClipNotes,
     /// What the recording holds.
@@ -127,6 +130,10 @@ pub fn animate(
     let fps = options.fps.unwrap_or_else(|| recording_rate(&clip));
     let surfaces = Surfaces::new(&rig);
     let mut info = recording_info(&rig, &surfaces, fps, scene.cloth.seed, options);
+    if scene.has_contact() {
+        info.colliders = Some(collider_surfaces(&scene)?);
+        info.stat_names.extend(stat_names(&scene));
+    }
     info.plotted_weights = most_moved(&clip, &info.weight_names);
     let foxglove_layout = foxglove_layout(&info, &options.recording);
     // Opened first: it refuses a bad frame rate or folder before anything is computed.
@@ -162,6 +169,7 @@ pub fn animate(
         wall_secs: wall.elapsed().as_secs_f64(),
         guards: measures.guards,
         settle_rms_max: measures.settle_rms_max,
+        contact: measures.contact,
         take,
         recording,
         foxglove_layout,
@@ -176,6 +184,7 @@ struct Measures {
     recording_ms: Vec<f64>,
     guards: Counters,
     settle_rms_max: f64,
+    contact: Option<ContactSummary>,
 }
 
 /// A simulation on its way into a recording.
@@ -189,11 +198,13 @@ struct Run<'a> {
     parts: Vec<Vec<Point3<f32>>>,
     /// Whether the stretch of the patches is recorded.
     has_strain: bool,
+    contact: Option<ContactLog>,
 }
 
 impl<'a> Run<'a> {
     fn new(simulation: Simulation, surfaces: &'a Surfaces, fps: f64, frame_count: u64) -> Self {
         Self {
+            contact: ContactLog::new(&simulation),
             simulation,
             surfaces,
             fps,
@@ -227,6 +238,7 @@ impl<'a> Run<'a> {
                 break;
             }
         }
+        self.measures.contact = self.contact.map(ContactLog::finish);
         Ok(self.measures)
     }
 
@@ -248,15 +260,29 @@ impl<'a> Run<'a> {
             strains.extend(rig.map(|(patch, nodes)| fibre_strain(&patch.patch, nodes)));
         }
         let strains: Vec<&[f32]> = strains.iter().map(Vec::as_slice).collect();
+        let mut stats = stats(report).to_vec();
+        let mut events: Vec<LogEvent> = guard_event(&report.step.counters).into_iter().collect();
+        if let Some(contact) = &mut self.contact {
+            stats.extend(contact.take(simulation, report));
+            events.extend(contact.event());
+        }
+        let placed: Vec<&[Point3<f32>]> = match &self.contact {
+            Some(contact) => contact.placed.iter().map(Vec::as_slice).collect(),
+            None => Vec::new(),
+        };
         recorder.record(&Frame {
+            contact: self.contact.as_ref().map(|contact| ContactFrame {
+                colliders: &placed,
+                arrows: &contact.arrows,
+            }),
             strains: &strains,
             skin,
             patches: &patches,
             parts: &parts,
             head: *simulation.head(),
             weights: &simulation.pose().weights,
-            stats: &stats(report),
-            events: guard_event(&report.step.counters).as_slice(),
+            stats: &stats,
+            events: &events,
         })?;
         self.measures.recording_ms.push(milliseconds(clock));
         Ok(())
@@ -426,6 +452,7 @@ fn recording_info(
         skin: surfaces.skin.clone(),
         patches: surfaces.patches.clone(),
         parts: surfaces.parts.clone(),
+        colliders: None,
         weight_names: rig.shape_names.clone(),
         plotted_weights: Vec::new(),
         stat_names: STAT_NAMES.map(str::to_owned).to_vec(),

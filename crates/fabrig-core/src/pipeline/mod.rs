@@ -20,6 +20,7 @@
 //! ```
 
 mod animate;
+mod contact;
 mod cost;
 mod own_shapes;
 mod rig_face;
@@ -27,6 +28,7 @@ mod strain;
 mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
+pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_folder, read_own_shapes};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};

@@ -13,7 +13,7 @@ const RIG_FRAME: &str = "rig";
 const WORLD_FRAME: &str = "world";
 
 /// A coordinate in message units, rounded.
-fn rounded(mm: f32) -> f64 {
+pub(super) fn rounded(mm: f32) -> f64 {
     // Adding zero turns -0 into 0, which takes no bytes.
     (f64::from(mm) * UNITS_PER_MM / POSITION_STEP).round() * POSITION_STEP + 0.0
 }
@@ -313,7 +313,7 @@ fn color(srgb: &[u8; 4]) -> wire::Color {
     wire::Color { r, g, b, a }
 }
 
-fn identity_pose() -> wire::Pose {
+pub(super) fn identity_pose() -> wire::Pose {
     wire::Pose {
         position: Some(wire::Vector3::default()),
         orientation: Some(wire::Quaternion {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::RecordingError;
+use super::{ContactFrame, RecordingError};
 
 /// Units of the messages per millimetre: they carry decimetres.
 pub const UNITS_PER_MM: f64 = 0.01;
@@ -25,6 +25,10 @@ pub mod topics {
     pub const STRAIN: &str = "/rig/strain";
     /// Eyeballs, teeth and tongue as shaded meshes.
     pub const PARTS: &str = "/rig/parts";
+    /// Colliders as shaded meshes; only where there are any.
+    pub const COLLIDERS: &str = "/colliders";
+    /// Where things touch, as arrows; only where contact is on.
+    pub const CONTACTS: &str = "/contacts";
     /// Skin vertices as points; shows in Rerun with no setup.
     pub const SKIN_POINTS: &str = "/points/skin";
     /// Patch nodes as points.
@@ -69,6 +73,8 @@ pub struct RecordingInfo {
     pub patches: Vec<SurfaceInfo>,
     /// Eyeballs, teeth, tongue; none is fine.
     pub parts: Vec<SurfaceInfo>,
+    /// Colliders of a scene with contact, none is fine; `None` for a scene without contact.
+    pub colliders: Option<Vec<SurfaceInfo>>,
     /// Names of the weights, in the order of [`Frame::weights`].
     pub weight_names: Vec<String>,
     /// Weights that plots show at first, by name; some from all over the list where empty.
@@ -144,6 +150,8 @@ pub struct Frame<'a> {
     /// Stretch of every node of every patch: 0 at rest, 0.1 for a tenth longer. Only read where
     /// [`RecordingOptions::strain_hz`] asks for it; may be empty otherwise.
     pub strains: &'a [&'a [f32]],
+    /// Contact; only where [`RecordingInfo::colliders`] announces it.
+    pub contact: Option<ContactFrame<'a>>,
     /// Where the head is: head frame to a fixed frame with +Y up. (mm)
     pub head: Isometry3<f64>,
     /// One per [`RecordingInfo::weight_names`].
@@ -187,7 +195,8 @@ impl RecordingInfo {
         }
         let surfaces = std::iter::once(&self.skin)
             .chain(&self.patches)
-            .chain(&self.parts);
+            .chain(&self.parts)
+            .chain(self.colliders.iter().flatten());
         for surface in surfaces {
             let count = surface.vertex_count;
             let colors = surface.vertex_colors.len();
@@ -206,7 +215,13 @@ impl RecordingInfo {
                 }
             }
         }
-        for (what, list) in [("patches", &self.patches), ("parts", &self.parts)] {
+        let none = Vec::new();
+        let colliders = self.colliders.as_ref().unwrap_or(&none);
+        for (what, list) in [
+            ("patches", &self.patches),
+            ("parts", &self.parts),
+            ("colliders", colliders),
+        ] {
             let mut names: Vec<&str> = list.iter().map(|s| s.name.as_str()).collect();
             names.sort_unstable();
             if let Some(pair) = names.windows(2).find(|w| w[0] == w[1]) {

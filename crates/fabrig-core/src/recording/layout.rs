@@ -19,8 +19,9 @@ const PLOTTED: usize = 12;
 pub const RERUN_SCRIPT: &str = include_str!("../../viewers/open_in_rerun.py");
 
 /// Units of the statistics by the end of their names, and what a plot of them is called.
-const UNITS: [(&str, &str); 3] = [
+const UNITS: [(&str, &str); 4] = [
     ("_mm", "Distances (mm)"),
+    ("_newton", "Forces (N)"),
     ("_energy", "Energies"),
     ("_ms", "Times (ms)"),
 ];
@@ -43,7 +44,12 @@ pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> Stri
         scenes.push(("strain", "Strain", topics::STRAIN));
     }
     let scenes = scenes.into_iter().map(|(id, title, topic)| {
-        let panel = scene_panel(title, &[topic, topics::PARTS]);
+        // Arrows stand on the patches, and would be hidden by the skin.
+        let mut visible = vec![topic, topics::PARTS, topics::COLLIDERS];
+        if topic == topics::PATCHES {
+            visible.push(topics::CONTACTS);
+        }
+        let panel = scene_panel(title, &visible);
         add(format!("3D!{id}"), panel)
     });
     let scenes: Vec<Value> = scenes.collect();
@@ -129,6 +135,8 @@ fn scene_panel(title: &str, visible: &[&str]) -> Value {
         topics::PATCHES,
         topics::STRAIN,
         topics::PARTS,
+        topics::COLLIDERS,
+        topics::CONTACTS,
         topics::SKIN_POINTS,
         topics::PATCH_POINTS,
     ];
@@ -223,6 +231,7 @@ mod tests {
             },
             patches: Vec::new(),
             parts: Vec::new(),
+            colliders: None,
             weight_names: (0..52).map(|k| format!("shape{k}")).collect(),
             plotted_weights: words(&["shape7", "shape40"]),
             stat_names: words(&["settle_mm", "bend_energy", "stretch_energy", "guards"]),

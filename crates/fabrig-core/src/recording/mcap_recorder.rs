@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use prost::Message;
 
 use super::background::BackgroundWriter;
+use super::contact::ContactEncoder;
 use super::container::ContainerWriter;
 use super::encode::{SurfaceEncoder, series, transforms};
 use super::frame::{POSITION_STEP, UNITS_PER_MM, field_name, stride, topics};
@@ -48,6 +49,7 @@ pub struct McapRecorder {
     patches: SurfaceEncoder,
     strained: SurfaceEncoder,
     parts: SurfaceEncoder,
+    contact: Option<ContactEncoder>,
     channels: Vec<Channel>,
     frames: u64,
     last_flush_nanos: u64,
@@ -77,12 +79,14 @@ impl McapRecorder {
         let patches = SurfaceEncoder::new(&info.patches);
         let strained = SurfaceEncoder::colored_later(&info.patches);
         let parts = SurfaceEncoder::new(&info.parts);
+        let contact = info.colliders.as_deref().map(ContactEncoder::new);
         let mut recorder = Self {
             writer: None,
             skin,
             patches,
             strained,
             parts,
+            contact,
             path,
             partial_path,
             info,
@@ -120,6 +124,12 @@ impl McapRecorder {
         ];
         if self.records_strain() {
             plan.push((topics::STRAIN, "foxglove.SceneUpdate", &shared));
+        }
+        if let Some(colliders) = &self.info.colliders {
+            if !colliders.is_empty() {
+                plan.push((topics::COLLIDERS, "foxglove.SceneUpdate", &shared));
+            }
+            plan.push((topics::CONTACTS, "foxglove.SceneUpdate", &shared));
         }
         let listed = |names: &[String]| {
             let fields: Vec<String> = names.iter().map(|name| field_name(name)).collect();
@@ -223,6 +233,11 @@ impl McapRecorder {
                 self.send(topics::PARTS, now, &scene)?;
             }
         }
+        if let (true, Some(encoder), Some(contact)) = (skin_due, &self.contact, &frame.contact) {
+            let colliders = encoder.colliders(now, contact);
+            self.send(topics::COLLIDERS, now, &colliders)?;
+            self.send(topics::CONTACTS, now, &ContactEncoder::arrows(now, contact))?;
+        }
         if patches_due && !frame.patches.is_empty() {
             let scene = self.patches.scene(now, frame.patches);
             self.send(topics::PATCHES, now, &scene)?;
@@ -310,6 +325,18 @@ impl McapRecorder {
         let patches = self.info.patches.iter().zip(frame.patches);
         for (info, positions) in patches.chain(self.info.parts.iter().zip(frame.parts)) {
             surface(info, positions)?;
+        }
+        if let Some(colliders) = &self.info.colliders {
+            let placed = frame.contact.map_or(&[][..], |contact| contact.colliders);
+            shape("colliders", colliders.len(), placed.len())?;
+            for (info, positions) in colliders.iter().zip(placed) {
+                surface(info, positions)?;
+            }
+            let arrows = frame.contact.map_or(&[][..], |contact| contact.arrows);
+            let is_bad = |a: &super::ContactArrow| {
+                !a.position.iter().chain(&a.normal).all(|c| c.is_finite())
+            };
+            finite("contact", arrows.iter().position(is_bad))?;
         }
         if self.records_strain() {
             shape(

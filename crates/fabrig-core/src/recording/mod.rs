@@ -25,6 +25,7 @@
 
 mod background;
 mod chunk;
+mod contact;
 mod container;
 mod encode;
 mod error;
@@ -36,6 +37,7 @@ mod reader;
 mod schema;
 mod strain;
 
+pub use contact::{ContactArrow, ContactFrame};
 pub use error::RecordingError;
 pub use frame::{
     Frame, LogEvent, LogLevel, RecordingInfo, RecordingOptions, RecordingReport, SurfaceInfo,

@@ -35,6 +35,10 @@ pub struct RecordedFrame {
     pub patches: Vec<RecordedSurface>,
     /// Eyeballs, teeth, tongue.
     pub parts: Vec<RecordedSurface>,
+    /// Colliders.
+    pub colliders: Vec<RecordedSurface>,
+    /// Where things touch: one surface of arrows, if contact was on.
+    pub contacts: Option<RecordedSurface>,
     /// Where the head is. (mm)
     pub head: Isometry3<f64>,
 }
@@ -233,6 +237,8 @@ impl RecordingReader {
                 skin: None,
                 patches: Vec::new(),
                 parts: Vec::new(),
+                colliders: Vec::new(),
+                contacts: None,
                 head: Isometry3::identity(),
             };
             (nanos, frame)
@@ -250,7 +256,11 @@ impl RecordingReader {
                     frame.head = head;
                 }
             }
-            topics::SKIN | topics::PATCHES | topics::PARTS => {
+            topics::SKIN
+            | topics::PATCHES
+            | topics::PARTS
+            | topics::COLLIDERS
+            | topics::CONTACTS => {
                 let scene = SceneUpdate::decode(data).map_err(message_error)?;
                 let surfaces =
                     surfaces_of(scene).map_err(|reason| RecordingError::NotARecording {
@@ -260,6 +270,8 @@ impl RecordingReader {
                 match topic {
                     topics::SKIN => frame.skin = surfaces.into_iter().next(),
                     topics::PATCHES => frame.patches = surfaces,
+                    topics::COLLIDERS => frame.colliders = surfaces,
+                    topics::CONTACTS => frame.contacts = surfaces.into_iter().next(),
                     _ => frame.parts = surfaces,
                 }
             }

@@ -163,6 +163,11 @@ pub fn recording_layers(
         let polygons = Polygons::from_faces(&part.info.triangles);
         layers.push(look.part(&part.info.name, place(part), &polygons, gaze)?);
     }
+    for collider in &frame.colliders {
+        let [r, g, b, _] = collider.info.color;
+        let layer = Layer::new(place(collider), collider.info.triangles.clone())?;
+        layers.push(layer.with_color(Rgb::from_srgb([r, g, b])));
+    }
     Ok(layers)
 }
 

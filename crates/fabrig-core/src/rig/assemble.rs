@@ -12,7 +12,7 @@ use crate::rig::template_side::TemplateSide;
 use crate::rig::tongue::give_shapes;
 use crate::rig::{Rig, RigError, RigJaw, RigPatch};
 use crate::skin::{FitOptions, SkinBinding, SmoothInterpolation};
-use crate::template::{JawHinge, Template};
+use crate::template::{JawHinge, RegionId, Template};
 use crate::transfer::{AlphaMode, Example, EyeShapes, JawMode, JawShapes, OffsetMode};
 use nalgebra::Similarity3;
 
@@ -187,11 +187,30 @@ pub fn build(
         eyes,
         eye_shapes: EyeShapes::of(template),
         parts,
+        region_names: template
+            .regions
+            .regions
+            .iter()
+            .map(|region| region.name.clone())
+            .collect(),
+        regions: skin_regions(template, &skin_places),
         materials: template.materials.clone(),
         registration_report: report.clone(),
     };
-    close_lids(&mut rig, template, &skin_places);
+    close_lids(&mut rig, template);
     Ok(rig)
+}
+
+/// The region of each place: that of the nearest corner of its triangle.
+fn skin_regions(template: &Template, places: &[Option<SurfacePoint>]) -> Vec<Option<RegionId>> {
+    let triangles = template.skin.triangles();
+    let region_of = |place: &SurfacePoint| {
+        let corners = triangles[place.triangle as usize];
+        let most = (0..3).max_by(|&a, &b| place.barycentric[a].total_cmp(&place.barycentric[b]));
+        template.regions.vertex_regions[corners[most.unwrap_or(0)] as usize]
+    };
+    let places = places.iter();
+    places.map(|place| place.as_ref().map(region_of)).collect()
 }
 
 /// Places of a template's own skin vertices on itself: registration that is exact.

@@ -11,7 +11,6 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::Vector;
-use crate::mesh::SurfacePoint;
 use crate::rig::Rig;
 use crate::skin::{NodeAffine, NodeFrames};
 use crate::template::{EyeSocket, RegionId, RigidBody, Template};
@@ -68,10 +67,9 @@ struct Mark {
 
 /// Corrects the blinks of a rig until the user's own lids meet.
 ///
-/// - `places`: of the user's vertices on the template, `None` for those that are not skin
-pub(super) fn close_lids(rig: &mut Rig, template: &Template, places: &[Option<SurfacePoint>]) {
+pub(super) fn close_lids(rig: &mut Rig, template: &Template) {
     let triangles = template.skin.triangles();
-    let mut eyes = find_lids(rig, template, &triangles, places);
+    let mut eyes = find_lids(rig, template);
     eyes.retain(|eye| !eye.upper.edges.is_empty() && !eye.lower.edges.is_empty());
     if eyes.is_empty() {
         return;
@@ -119,17 +117,7 @@ pub(super) fn close_lids(rig: &mut Rig, template: &Template, places: &[Option<Su
     }
 }
 
-fn find_lids(
-    rig: &Rig,
-    template: &Template,
-    triangles: &[[u32; 3]],
-    places: &[Option<SurfacePoint>],
-) -> Vec<EyeLids> {
-    let region_of = |place: &SurfacePoint| {
-        let corners = triangles[place.triangle as usize];
-        let most = (0..3).max_by(|&a, &b| place.barycentric[a].total_cmp(&place.barycentric[b]));
-        template.regions.vertex_regions[corners[most.unwrap_or(0)] as usize]
-    };
+fn find_lids(rig: &Rig, template: &Template) -> Vec<EyeLids> {
     let mut eyes = Vec::new();
     for (eye, side) in ["l", "r"].into_iter().enumerate() {
         let region = |lid: &str| template.regions.find(&format!("{lid}_{side}"));
@@ -164,9 +152,9 @@ fn find_lids(
         });
     }
     // (eye, is upper, slot) of each vertex on a lid.
-    let mut slots = vec![None; places.len()];
-    for (v, place) in places.iter().enumerate() {
-        let Some(region) = place.as_ref().map(region_of) else {
+    let mut slots = vec![None; rig.regions.len()];
+    for (v, region) in rig.regions.iter().enumerate() {
+        let Some(region) = *region else {
             continue;
         };
         for (e, eye) in eyes.iter_mut().enumerate() {

@@ -16,7 +16,7 @@ use crate::atomic_file::write_atomically;
 use crate::rig::{Rig, RigError};
 
 /// Version of the format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 const MARK: &[u8; 8] = b"FABRIG\r\n";
 const HEADER_LENGTH: usize = 24;

@@ -30,7 +30,7 @@ use crate::Point;
 use crate::anatomy::{GridShape, Patch};
 use crate::mesh::Mesh;
 use crate::skin::{NodeAffine, SkinBinding};
-use crate::template::{EyeSocket, JawHinge};
+use crate::template::{EyeSocket, JawHinge, RegionId};
 use crate::transfer::{
     EyeShapes, JawMode, JawPose, JawShapes, PatchTransfer, ShapeWeights, TransferContext,
     TransferError,
@@ -88,6 +88,10 @@ pub struct Rig {
     pub eye_shapes: [EyeShapes; 2],
     /// Pieces of the mesh that move rigidly: eyeballs, teeth, tongue.
     pub parts: Vec<RigPart>,
+    /// Names of the template's regions.
+    pub region_names: Vec<String>,
+    /// Region of each vertex of the face; none where it is no skin.
+    pub regions: Vec<Option<RegionId>>,
     /// Text of the template's `materials.toml`.
     pub materials: String,
     /// What registration reported about this face, as JSON; empty where there was none.
@@ -98,6 +102,19 @@ impl Rig {
     /// Index of a shape in lists of weights.
     pub fn shape_index(&self, name: &str) -> Option<usize> {
         self.shape_names.iter().position(|n| n == name)
+    }
+
+    /// Vertices of the face that lie in one of these regions, rising.
+    pub fn vertices_in(&self, regions: &[&str]) -> Vec<u32> {
+        let is_named = |region: &RegionId| {
+            let name = self.region_names.get(region.0 as usize);
+            name.is_some_and(|name| regions.contains(&name.as_str()))
+        };
+        let labels = (0u32..).zip(&self.regions);
+        labels
+            .filter(|(_, region)| region.as_ref().is_some_and(is_named))
+            .map(|(vertex, _)| vertex)
+            .collect()
     }
 
     /// Shapes that move nothing on this face, such as `tongueOut` where the mesh has no tongue.

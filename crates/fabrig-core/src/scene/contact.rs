@@ -1,15 +1,15 @@
 //! Contact of a face: its patches, eyeballs and the colliders around it.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
-use crate::anatomy::{Attachment, PatchKind, Side};
+use crate::anatomy::{Attachment, PatchChart, PatchKind, Side};
 use crate::cloth::ClothPatch;
 use crate::collision::{
-    Collider, ColliderFrame, ColliderKey, ColliderShape, CollisionError, Contact, ContactBody,
-    ContactPatch, PairMask, Verdict,
+    Collider, ColliderFrame, CollisionError, Contact, ContactBody, ContactPatch, Verdict,
 };
 use crate::rig::Rig;
 use crate::scene::Scene;
+use crate::scene::bodies::Eyeball;
 use nalgebra::Point3;
 
 /// Deeper nodes than this are covered no more: the tissue over them gives way. (mm)
@@ -32,9 +32,10 @@ impl FaceContact {
         rig: &Rig,
         scene: &Scene,
         patches: &[ClothPatch],
+        eyeballs: &[Eyeball; 2],
     ) -> Result<Option<Self>, CollisionError> {
         scene.contact.check()?;
-        if scene.contact.pairs == PairMask::None && scene.colliders.is_empty() {
+        if !scene.has_contact() {
             return Ok(None);
         }
         let of_contact: Vec<ContactPatch> = rig
@@ -61,7 +62,7 @@ impl FaceContact {
                         })
                         .collect(),
                     is_ring,
-                    is_mouth: is_ring && chart.side == Side::Mid,
+                    is_mouth: is_mouth_ring(chart),
                     node_mass: scene.cloth.areal_density * cloth.material.mass * cloth.area()
                         / cloth.rest.len() as f64,
                     bodies: match (is_ring, chart.side) {
@@ -72,21 +73,12 @@ impl FaceContact {
                 }
             })
             .collect();
-        let bodies: Vec<ContactBody> = ["eye_l", "eye_r"]
+        let bodies: Vec<ContactBody> = eyeballs
             .iter()
-            .zip(&rig.eyes)
-            .map(|(name, eye)| ContactBody {
-                collider: Collider {
-                    name: (*name).to_owned(),
-                    shape: ColliderShape::Ball { radius: eye.radius },
-                    frame: ColliderFrame::Head,
-                    friction: scene.contact.eye_friction,
-                    keys: vec![ColliderKey {
-                        time: 0.0,
-                        position: eye.center.coords,
-                        rotation: Vector3::zeros(),
-                    }],
-                },
+            .map(|ball| ContactBody {
+                surface: ball.surface.clone(),
+                friction: scene.contact.eye_friction,
+                rest: ball.rest(),
             })
             .collect();
         let contact = Contact::new(&of_contact, &bodies, &scene.colliders, &scene.contact)?;
@@ -95,13 +87,7 @@ impl FaceContact {
             set_poses: vec![None; scene.colliders.len()],
             poses: vec![Isometry3::identity(); scene.colliders.len()],
             colliders: scene.colliders.clone(),
-            centers: [0, 1].map(|e| {
-                Isometry3::translation(
-                    rig.eyes[e].center.x,
-                    rig.eyes[e].center.y,
-                    rig.eyes[e].center.z,
-                )
-            }),
+            centers: eyeballs.each_ref().map(Eyeball::rest),
         }))
     }
 
@@ -163,4 +149,9 @@ impl FaceContact {
             .collect();
         self.contact.judge(positions, &colliders)
     }
+}
+
+/// Whether a patch is the ring around the mouth.
+pub(super) fn is_mouth_ring(chart: &PatchChart) -> bool {
+    chart.kind == PatchKind::Sphincter && chart.side == Side::Mid
 }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Point;
 use crate::cloth::{ClothOptions, STANDING_GRAVITY};
-use crate::collision::{Collider, ContactOptions};
+use crate::collision::{Collider, ContactOptions, PairMask};
+use crate::scene::SceneError;
 
 /// Whether patches have mass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -71,6 +72,52 @@ impl Default for Scene {
 }
 
 impl Scene {
+    /// Whether anything could touch anything in it.
+    pub fn has_contact(&self) -> bool {
+        let is_asked_for = self.contact.pairs != PairMask::None || !self.colliders.is_empty();
+        self.dynamics == Dynamics::Cloth && is_asked_for
+    }
+
+    /// Reads a scene from text (TOML); what it leaves out is as by default.
+    ///
+    /// ```
+    /// let text = "gravity = [0, 0, 0]\n[contact]\npairs = \"all\"\nsticky_lips = {}\n";
+    /// let scene = fabrig_core::scene::Scene::from_toml(text)?;
+    /// assert!(scene.has_contact());
+    /// # Ok::<(), fabrig_core::scene::SceneError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Text`] with line and column, [`SceneError::Collision`] for contact options
+    /// or colliders that cannot be.
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        let scene = toml::from_str(text).map_err(|e| SceneError::Text {
+            reason: e.to_string(),
+        })?;
+        Self::checked(scene)
+    }
+
+    /// As [`Self::from_toml`], from JSON.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::from_toml`].
+    pub fn from_json(text: &str) -> Result<Self, SceneError> {
+        let scene = serde_json::from_str(text).map_err(|e| SceneError::Text {
+            reason: e.to_string(),
+        })?;
+        Self::checked(scene)
+    }
+
+    fn checked(scene: Self) -> Result<Self, SceneError> {
+        scene.contact.check()?;
+        for (index, collider) in scene.colliders.iter().enumerate() {
+            collider.check(index)?;
+        }
+        Ok(scene)
+    }
+
     /// The default scene without mass: patches stand where the muscle shapes want them.
     pub fn without_dynamics() -> Self {
         Self {

@@ -12,6 +12,12 @@ pub enum SceneError {
         /// What was given.
         dt: f64,
     },
+    /// The text of a scene cannot be read.
+    #[error("the scene cannot be read: {reason}")]
+    Text {
+        /// What is wrong, with line and column.
+        reason: String,
+    },
     /// Contact refused its options or a collider.
     #[error(transparent)]
     Collision(#[from] CollisionError),

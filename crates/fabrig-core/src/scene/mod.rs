@@ -2,15 +2,18 @@
 
 mod anchors;
 mod bench_face;
+mod bodies;
 mod chain_loss;
 mod contact;
 mod description;
 mod error;
 mod head;
 mod simulation;
+mod skin_contact;
 
 pub use bench_face::face_bench_scene;
 pub use chain_loss::{LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss};
 pub use description::{Dynamics, EyeSource, Scene};
 pub use error::SceneError;
 pub use simulation::{FacePose, FrameReport, PartPose, Simulation, cloth_patches};
+pub use skin_contact::SkinContactReport;

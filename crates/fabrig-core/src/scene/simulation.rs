@@ -15,8 +15,10 @@ use crate::collision::{CollisionError, ContactPoint, ContactReport, Verdict};
 use crate::motion::{Clip, EyeAngles, Sample};
 use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
+use crate::scene::bodies::{Eyeball, eyeballs};
 use crate::scene::contact::FaceContact;
 use crate::scene::head::{head_motion, head_to_world};
+use crate::scene::skin_contact::{SkinContact, SkinContactReport};
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
 use crate::template::RigidBody;
@@ -74,6 +76,8 @@ pub struct FrameReport {
     pub settle_rms: f64,
     /// Largest of these distances. (mm)
     pub settle_max: f64,
+    /// What contact did to the skin.
+    pub skin_contact: SkinContactReport,
 }
 
 /// Where a rigid piece of the face stands.
@@ -97,6 +101,9 @@ pub struct Simulation {
     sample: Sample,
     cloth: Option<Cloth>,
     contact: Option<FaceContact>,
+    skin_contact: Option<SkinContact>,
+    skin_report: SkinContactReport,
+    eyeballs: [Eyeball; 2],
     evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
@@ -126,11 +133,13 @@ impl Simulation {
             Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
             Dynamics::None => None,
         };
-        let contact = match scene.dynamics {
-            Dynamics::Cloth => FaceContact::new(&rig, &scene, &patches)?,
-            Dynamics::None => None,
-        };
+        let eyeballs = eyeballs(&rig);
+        let mut contact = FaceContact::new(&rig, &scene, &patches, &eyeballs)?;
         let skin = rig.skin_at_rest();
+        let skin_contact = SkinContact::new(&rig, &scene, &eyeballs, &skin)?;
+        if let (Some(of_cloth), Some(of_skin)) = (&mut contact, &skin_contact) {
+            of_cloth.contact.set_lips(of_skin.sticky_lips());
+        }
         let deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
         let count = rig.patches.len();
         let time = clip.as_ref().map_or(0.0, |c| c.times()[0]);
@@ -144,6 +153,9 @@ impl Simulation {
             sample: Sample::default(),
             cloth,
             contact,
+            skin_contact,
+            skin_report: SkinContactReport::default(),
+            eyeballs,
             evaluated: vec![(Vec::new(), Vec::new()); count],
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
@@ -261,6 +273,7 @@ impl Simulation {
         let clock = Instant::now();
         self.move_skin()?;
         report.skin_ms = milliseconds(clock);
+        report.skin_contact = self.skin_report;
 
         self.time += dt;
         report.time = self.time;
@@ -285,6 +298,11 @@ impl Simulation {
     /// What contact did in the last frame; none where nothing could touch.
     pub fn contact_report(&self) -> Option<&ContactReport> {
         self.contact.as_ref().map(|c| c.contact.report())
+    }
+
+    /// What contact did to the skin when it was last moved.
+    pub fn skin_contact_report(&self) -> &SkinContactReport {
+        &self.skin_report
     }
 
     /// Where things touched at the end of the last frame.
@@ -479,6 +497,14 @@ impl Simulation {
         let mandible = self.rig.mandible(&self.pose.weights);
         self.deformer
             .deform(&self.rig.binding, &nodes, mandible, &mut self.skin)?;
+        let eyes = [0, 1].map(|e| self.eye(e) * self.eyeballs[e].rest());
+        if let Some(contact) = &mut self.skin_contact {
+            let colliders = self.contact.as_ref().map_or(&[][..], |c| c.poses());
+            self.skin_report = contact.settle(&mut self.skin, colliders, &eyes);
+            if let Some(of_cloth) = &mut self.contact {
+                of_cloth.contact.set_touching(contact.touching(&self.skin));
+            }
+        }
         for part in self.parts() {
             let piece = &self.rig.parts[part.part];
             let weight = |shape: u32| self.pose.weights[shape as usize];

@@ -25,6 +25,7 @@ mod frames;
 mod interpolation;
 pub mod kernel;
 mod mirror;
+mod spread;
 mod stored;
 mod vertex_fit;
 
@@ -36,3 +37,4 @@ pub use fit::{FitOptions, Pose, TemplateWeights, fit_to_shapes};
 pub use frames::{NodeAffine, NodeFrames};
 pub use interpolation::SmoothInterpolation;
 pub use mirror::NodeMirror;
+pub use spread::SkinSpreader;

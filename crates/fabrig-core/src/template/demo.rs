@@ -72,3 +72,14 @@ pub fn demo_face() -> Mesh {
 pub fn demo_take() -> &'static str {
     include_str!("../../../../templates/demo/take.keys")
 }
+
+/// A take for contact: lips that press and open, a face that is pressed, blinks over eyes that
+/// look about.
+pub fn demo_contact_take() -> &'static str {
+    include_str!("../../../../templates/demo/contact.keys")
+}
+
+/// Colliders of that take as text: a finger on the demo face's cheek, a ball on its forehead.
+pub fn demo_contact_colliders() -> &'static str {
+    include_str!("../../../../templates/demo/contact.toml")
+}

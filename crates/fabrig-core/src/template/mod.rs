@@ -12,7 +12,7 @@ mod load;
 mod pack;
 mod people;
 
-pub use demo::{demo_face, demo_take};
+pub use demo::{demo_contact_colliders, demo_contact_take, demo_face, demo_take};
 pub use error::TemplateError;
 pub use load::{PackFiles, human};
 pub use pack::{

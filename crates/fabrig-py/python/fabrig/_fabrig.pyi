@@ -132,12 +132,22 @@ class Simulation:
         rig: Rig,
         clip: Clip | None = None,
         *,
+        scene: Mapping[str, Any] | None = None,
         gravity: ArrayLike | None = None,
         wind: ArrayLike | None = None,
         substeps: int | None = None,
         dynamics: bool = True,
     ) -> None: ...
     def step(self, dt: float, *, weights: ArrayLike | None = None) -> dict[str, Any]: ...
+    def set_collider(
+        self, name: str, position: ArrayLike, *, rotation: ArrayLike | None = None
+    ) -> None: ...
+    @property
+    def collider_forces(self) -> dict[str, NDArray[np.float64]]: ...
+    @property
+    def contact(self) -> dict[str, Any] | None: ...
+    @property
+    def contact_points(self) -> NDArray[np.float32]: ...
     @property
     def time(self) -> float: ...
     @property
@@ -184,6 +194,7 @@ def animate(
     clip: Clip,
     output: Path,
     *,
+    scene: Mapping[str, Any] | None = None,
     fps: float | None = None,
     gravity: ArrayLike | None = None,
     wind: ArrayLike | None = None,

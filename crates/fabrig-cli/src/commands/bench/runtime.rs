@@ -5,6 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use fabrig_core::cloth::ClothOptions;
 use fabrig_core::cloth::bench::{BenchScene, run as run_cloth};
+use fabrig_core::collision::PairMask;
 use fabrig_core::motion::{self, Clip, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, TimeStatistics, animate};
 use fabrig_core::rig::Rig;
@@ -24,6 +25,15 @@ const SIMPLE_TAKE: &str = "fabrig-keys 1\n0 jawOpen=0\n0.5 jawOpen=0.8\n1 jawOpe
 /// nodes.
 const SCALES: [f64; 4] = [0.32, 1.0, 1.606, 3.21];
 
+/// Frames a second of the four rows of the paper's Table 1, in its order.
+const PAPER_FPS: [f64; 4] = [37.3, 32.9, 35.3, 29.7];
+
+const CONTACTS: [(&str, PairMask); 3] = [
+    ("none", PairMask::None),
+    ("sphincter", PairMask::Sphincter),
+    ("all", PairMask::All),
+];
+
 /// One row of the grid of the paper's Table 1.
 #[derive(Debug, Serialize)]
 struct FaceRow {
@@ -38,6 +48,13 @@ struct FaceRow {
     with_skin: TimeStatistics,
     /// And what recording takes of the simulating thread. (ms)
     with_recording: TimeStatistics,
+    /// Median time with skin, against that without contact.
+    against_none: f64,
+    /// Frames a second that the median time with skin is.
+    fps: f64,
+    /// Median counts of a frame.
+    candidates: usize,
+    contacts: usize,
 }
 
 /// The cloth alone at one size.
@@ -55,6 +72,8 @@ struct SizeRow {
 #[derive(Debug, Serialize)]
 struct Report {
     processor: String,
+    /// Frames a second of the paper's four rows.
+    paper_fps: [f64; 4],
     faces: Vec<FaceRow>,
     sizes: Vec<SizeRow>,
     /// Largest over least time per node, by thread count.
@@ -67,6 +86,7 @@ pub(crate) fn run(console: &Console, args: &BenchRuntimeArgs) -> Result<Outcome>
     let takes = [("simple", simple), ("complex", demo_scene::take()?)];
     let mut report = Report {
         processor: processor(),
+        paper_fps: PAPER_FPS,
         faces: Vec::new(),
         sizes: Vec::new(),
         growth: Vec::new(),
@@ -77,10 +97,15 @@ pub(crate) fn run(console: &Console, args: &BenchRuntimeArgs) -> Result<Outcome>
             .build()
             .context("cannot start threads")?;
         for (name, clip) in &takes {
-            let row = pool.install(|| face(console, &rig, name, clip, threads))?;
-            report.faces.push(row);
-            if console.is_stopped() {
-                return Ok(Outcome::Partial);
+            let mut none = None;
+            for contact in CONTACTS {
+                let mut row =
+                    pool.install(|| face(console, &rig, (name, clip), contact, threads))?;
+                row.against_none = row.with_skin.median / *none.get_or_insert(row.with_skin.median);
+                report.faces.push(row);
+                if console.is_stopped() {
+                    return Ok(Outcome::Partial);
+                }
             }
         }
         for scale in SCALES {
@@ -120,8 +145,8 @@ pub(crate) fn run(console: &Console, args: &BenchRuntimeArgs) -> Result<Outcome>
 fn face(
     console: &Console,
     rig: &Arc<Rig>,
-    take: &'static str,
-    clip: &Clip,
+    (take, clip): (&'static str, &Clip),
+    (contact, pairs): (&'static str, PairMask),
     threads: usize,
 ) -> Result<FaceRow> {
     let folder = std::env::temp_dir().join(format!("fabrig-bench-{}", std::process::id()));
@@ -133,10 +158,12 @@ fn face(
         fps: Some(demo_scene::FPS),
         ..AnimateOptions::default()
     };
+    let mut scene = Scene::default();
+    scene.contact.pairs = pairs;
     let result = animate(
         Arc::clone(rig),
         clip.clone(),
-        Scene::default(),
+        scene,
         &path,
         &options,
         &mut |at| {
@@ -153,7 +180,11 @@ fn face(
     let recording = &result.recording_ms;
     Ok(FaceRow {
         take,
-        contact: "none",
+        contact,
+        against_none: 1.0,
+        fps: 1e3 / skin.median,
+        candidates: result.contact.as_ref().map_or(0, |c| c.candidates_median),
+        contacts: result.contact.as_ref().map_or(0, |c| c.contacts_median),
         threads,
         nodes: result.node_count,
         vertices: result.vertex_count,
@@ -186,24 +217,41 @@ fn processor() -> String {
 fn print(console: &Console, report: &Report) {
     console.result(&report.processor);
     console.result(&format!(
-        "{:<10}{:<11}{:>8}  {:<26}{:<26}{:<26}",
-        "take", "contact", "threads", "simulation [ms]", "+ skin", "+ recording"
+        "{:<9}{:<11}{:>7}  {:<24}{:<24}{:<24}{:>7}{:>8}{:>11}{:>9}",
+        "take",
+        "contact",
+        "threads",
+        "simulation [ms]",
+        "+ skin",
+        "+ recording",
+        "fps",
+        "x none",
+        "candidates",
+        "contacts"
     ));
     let times = |t: &TimeStatistics| format!("{:.2} / {:.2} / {:.2}", t.median, t.p95, t.p99);
     for row in &report.faces {
         console.result(&format!(
-            "{:<10}{:<11}{:>8}  {:<26}{:<26}{:<26}",
+            "{:<9}{:<11}{:>7}  {:<24}{:<24}{:<24}{:>7.1}{:>8.2}{:>11}{:>9}",
             row.take,
             row.contact,
             row.threads,
             times(&row.simulation),
             times(&row.with_skin),
-            times(&row.with_recording)
+            times(&row.with_recording),
+            row.fps,
+            row.against_none,
+            row.candidates,
+            row.contacts
         ));
     }
+    console.result(&format!(
+        "median / 95 % / 99 %; frames a second are of the median with skin; the paper's four rows \
+         of the same size: {} fps",
+        PAPER_FPS.map(|fps| fps.to_string()).join(", ")
+    ));
     console.result(
-        "median / 95 % / 99 %; the cloth alone, with pairs and a shaking head; \
-         time per node of the quickest frame:",
+        "the cloth alone, with pairs and a shaking head; time per node of the quickest frame:",
     );
     console.result(&format!(
         "{:>8}{:>9}  {:<26}{:>9}{:>12}",
