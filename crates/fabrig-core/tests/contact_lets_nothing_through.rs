@@ -199,7 +199,10 @@ fn sealed_lips_stay_sealed_until_the_jaw_pulls_them_apart() {
     // The corners stay together.
     assert!(open * 3 < sealed, "{open} of {sealed} bonds left");
     let (again, _) = play(&[("jawOpen", 0.3)], 10);
-    assert!(again * 3 < sealed, "lips that do not touch do not stick again: {again}");
+    assert!(
+        again * 3 < sealed,
+        "lips that do not touch do not stick again: {again}"
+    );
 }
 
 /// Every frame of the real take with everything that may touch, judged; minutes.

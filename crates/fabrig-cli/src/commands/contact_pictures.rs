@@ -52,7 +52,7 @@ const STORIES: [Story; 4] = [
 ];
 
 /// Width and height of one moment. (pixels)
-const SIZE: [u32; 2] = [360, 300];
+const SIZE: [u32; 2] = [300, 250];
 const COLUMNS: u32 = 3;
 
 /// Draws all stories of a recording into a folder.

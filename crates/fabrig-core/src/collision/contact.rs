@@ -388,7 +388,7 @@ impl SubstepHook for Contact {
         self.resolve(&goal, substep.progress, force_per_shift);
         nodes.copy_from_slice(&self.positions[..self.cloth_count]);
         if substep.progress[1] >= 1.0 {
-            self.form_bonds();
+            self.drop_broken();
         }
     }
 

@@ -20,6 +20,9 @@ pub(super) const MARGIN: f64 = 0.15;
 /// Smallest and largest budget. (mm)
 const BUDGETS: [f32; 2] = [0.3, 2.5];
 
+/// Within this a cell of the default resolution turns by less than 40 degrees. (mm)
+const SMALL_BUDGET: f32 = 0.6;
+
 /// Share of the distance at rest that is kept, where that is less than the thickness.
 const REST_SHARE: f64 = 0.5;
 
@@ -162,7 +165,8 @@ impl Contact {
 
     fn detect(&self, list: &mut PairList, cells: &mut Vec<[u32; 2]>) {
         list.candidates.clear();
-        if list.a == list.b && self.parts[list.a].is_flat() {
+        let is_slow = self.budgets[list.a] <= SMALL_BUDGET;
+        if list.a == list.b && is_slow && self.parts[list.a].is_flat() {
             list.spare = f32::INFINITY;
             return;
         }

@@ -11,7 +11,7 @@ use crate::anatomy::GridShape;
 const NEXT_CELLS: u32 = 2;
 
 /// Least cosine between the normals of a flat sheet and their mean: 50 degrees, so that a
-/// budget's motion leaves them under 90.
+/// small budget's motion leaves them under 90.
 const FLAT: f32 = 0.64;
 
 /// A cell of a part and the elements that it owns; every element is owned by one cell.
@@ -139,7 +139,7 @@ impl Part {
     }
 
     /// Whether all cells of a grid look so much the same way that it cannot reach itself, nor
-    /// will within a budget: a sheet must turn by a right angle to fold over.
+    /// will within a small budget: a sheet must turn by a right angle to fold over.
     pub(crate) fn is_flat(&self) -> bool {
         let sum: Vector3<f32> = self.normals.iter().sum();
         let is_open = self.grid.is_some_and(|grid| !grid.is_periodic);

@@ -43,13 +43,15 @@ impl Contact {
         self.touching = vec![None; self.lip_of.len()];
     }
 
-    /// Says at which of these nodes the skin of the lips touches now: there bonds form.
+    /// Says at which of these nodes the skin of the lips touches now, when it was moved after a
+    /// frame: there bonds form.
     pub fn set_touching(&mut self, is_touching: impl IntoIterator<Item = bool>) {
         for ((slot, lip), is_touching) in
             self.touching.iter_mut().zip(&self.lip_of).zip(is_touching)
         {
             *slot = is_touching.then_some(*lip);
         }
+        self.form_bonds();
     }
 
     /// One sweep over all bonds; those that are overstretched break.
@@ -90,11 +92,16 @@ impl Contact {
         self.bonds = bonds;
     }
 
-    /// At the end of a frame: forgets broken bonds and forms new ones.
-    pub(super) fn form_bonds(&mut self) {
+    /// At the end of a frame: forgets broken bonds.
+    pub(super) fn drop_broken(&mut self) {
         let before = self.bonds.len();
         self.bonds.retain(|b| !b.is_broken);
         self.report.broken_bonds += before - self.bonds.len();
+        self.report.bonds = self.bonds.len();
+    }
+
+    /// Forms bonds where the skin of the lips touches.
+    fn form_bonds(&mut self) {
         let Some((part, past)) = self.sticky else {
             return;
         };

@@ -21,9 +21,9 @@ pub const RERUN_SCRIPT: &str = include_str!("../../viewers/open_in_rerun.py");
 /// Units of the statistics by the end of their names, and what a plot of them is called.
 const UNITS: [(&str, &str); 4] = [
     ("_mm", "Distances (mm)"),
-    ("_newton", "Forces (N)"),
     ("_energy", "Energies"),
     ("_ms", "Times (ms)"),
+    ("_newton", "Forces (N)"),
 ];
 /// What a plot of all other statistics is called.
 const COUNTS: &str = "Counts";
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(lines("Plot!stats0", true), ["/stats.settle_mm"]);
         let energies = ["/stats.bend_energy", "/stats.stretch_energy"];
         assert_eq!(lines("Plot!stats1", true), energies);
-        assert_eq!(lines("Plot!stats3", true), ["/stats.guards"]);
+        assert_eq!(lines("Plot!stats4", true), ["/stats.guards"]);
         assert_eq!(
             lines("Plot!weights", true),
             ["/weights.shape7", "/weights.shape40"]
