@@ -140,8 +140,10 @@ fn a_scene_that_begins_with_a_finger_in_the_cheek_lets_it_out_and_says_so() {
     let rig = &faces::demo().rig;
     let rest = Simulation::new(Arc::clone(rig), Scene::without_dynamics(), None).unwrap();
     let inside = front_at(&rest, 40.0, -40.0) - Vector::new(0.0, 0.0, 4.0);
-    let mut scene = Scene::default();
-    scene.colliders = vec![finger(ColliderFrame::Head, inside)];
+    let scene = Scene {
+        colliders: vec![finger(ColliderFrame::Head, inside)],
+        ..Scene::default()
+    };
     let mut simulation = Simulation::new(Arc::clone(rig), scene, None).unwrap();
     let started = simulation.contact_report().unwrap().clone();
     assert!(
