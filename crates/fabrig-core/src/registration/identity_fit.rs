@@ -449,7 +449,7 @@ mod tests {
                 Vector::new(0.03, 0.0, 0.02),
                 1.02,
             ),
-            coefficients: DVector::from_fn(12, |k, _| if k % 2 == 0 { 1.0 } else { -0.7 }),
+            coefficients: DVector::from_fn(12, |k, _| if k % 2 == 0 { 0.5 } else { -0.35 }),
         };
         let places = truth.vertices(&model);
         let surface = Surface::new(&places, &model.triangles).expect("surface");
@@ -460,7 +460,7 @@ mod tests {
             &vertices,
             &|p, n, reach| {
                 let at = surface
-                    .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.3)?;
+                    .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.5)?;
                 Some((at.point, surface.blend(&at, &normals).normalize()))
             },
             &|_, _, _| Vec::new(),
