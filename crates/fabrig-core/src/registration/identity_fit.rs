@@ -460,7 +460,7 @@ mod tests {
             &vertices,
             &|p, n, reach| {
                 let at = surface
-                    .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.5)?;
+                    .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.3)?;
                 Some((at.point, surface.blend(&at, &normals).normalize()))
             },
             &|_, _, _| Vec::new(),
@@ -468,7 +468,7 @@ mod tests {
             &IdentityFit::template(),
             &Fitting {
                 mode_count: 12,
-                rounds: 20,
+                rounds: 60,
                 sigma: [3.0, 0.3],
                 reach: [20.0, 6.0],
                 has_own_normals: true,
