@@ -156,10 +156,8 @@ impl Posed {
     /// (mm)
     fn against_drawn(&self, shape: &str) -> Vec<(usize, f64, f64)> {
         let template = template::human();
-        let mut drawn = vec![Vector::zeros(); template.skin.vertex_count()];
-        for &(v, d) in &template.shapes[template.shape_index(shape).unwrap()].deltas {
-            drawn[v as usize] = d;
-        }
+        let shape = &template.shapes[template.shape_index(shape).unwrap()];
+        let drawn = shape.spread(template.skin.vertex_count());
         let triangles = template.skin.triangles();
         (0..self.rest.len())
             .filter(|&v| !self.face.is_part(v as u32))

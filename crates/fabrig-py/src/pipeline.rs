@@ -122,11 +122,7 @@ pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -
 fn expression(name: String, vertices: &Bound<'_, PyAny>) -> PyResult<Expression> {
     let shapes = &template::human().shapes;
     let mut weights = vec![0.0; shapes.len()];
-    let names = match match_shape(&name) {
-        Some(ShapeMatch::One(shape)) => vec![ARKIT_SHAPES[shape]],
-        Some(ShapeMatch::Both(left, right)) => vec![ARKIT_SHAPES[left], ARKIT_SHAPES[right]],
-        None => Vec::new(),
-    };
+    let names = match_shape(&name).map_or_else(Vec::new, ShapeMatch::names);
     for (shape, weight) in shapes.iter().zip(&mut weights) {
         if names.contains(&shape.name.as_str()) {
             *weight = 1.0;

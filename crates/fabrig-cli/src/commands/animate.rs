@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
-use fabrig_core::edit::{Edits, edits_path};
+use fabrig_core::edit::{edits_path, load_edited_rig};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{
     AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate,
@@ -41,12 +41,13 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
 
 /// Loads a rig with the edits that stand beside it.
 pub(super) fn load_rig(path: &Path) -> Result<Rig> {
-    let mut rig = load_unedited_rig(path)?;
-    let beside = || format!("{} cannot be used", edits_path(path).display());
-    if let Some(edits) = Edits::beside(path).with_context(beside)? {
-        edits.apply(&mut rig).with_context(beside)?;
-    }
-    Ok(rig)
+    load_edited_rig(path).map_err(|error| {
+        let culprit = match error {
+            fabrig_core::Error::Edit(_) => edits_path(path),
+            _ => path.to_owned(),
+        };
+        anyhow::Error::from(error).context(format!("{} cannot be used", culprit.display()))
+    })
 }
 
 /// Loads a rig as it was built.

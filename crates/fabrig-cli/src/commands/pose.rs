@@ -1,7 +1,7 @@
 //! Poses as text: `jawOpen=0.5,mouthSmile=1`.
 
 use anyhow::{Result, anyhow, ensure};
-use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
+use fabrig_core::facs::{ShapeMatch, match_shape, nearest_name};
 
 /// The expressions of the sheet that `fabrig render --expressions` draws.
 pub(super) const EXPRESSIONS: [(&str, &str); 12] = [
@@ -40,11 +40,7 @@ pub(super) fn parse_pose(text: &str, shapes: &[String]) -> Result<Vec<f32>> {
             (0.0..=1.0).contains(&weight),
             "'{item}': weights lie in [0, 1]"
         );
-        let names = match match_shape(name.trim()) {
-            Some(ShapeMatch::One(shape)) => vec![ARKIT_SHAPES[shape]],
-            Some(ShapeMatch::Both(left, right)) => vec![ARKIT_SHAPES[left], ARKIT_SHAPES[right]],
-            None => Vec::new(),
-        };
+        let names = match_shape(name.trim()).map_or_else(Vec::new, ShapeMatch::names);
         let found: Vec<usize> = names
             .iter()
             .filter_map(|name| shapes.iter().position(|s| s == name))
@@ -63,6 +59,8 @@ pub(super) fn parse_pose(text: &str, shapes: &[String]) -> Result<Vec<f32>> {
 
 #[cfg(test)]
 mod tests {
+    use fabrig_core::facs::ARKIT_SHAPES;
+
     use super::*;
 
     #[test]

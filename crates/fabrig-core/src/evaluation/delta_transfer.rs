@@ -29,10 +29,7 @@ impl DeltaTransfer {
             .shapes
             .iter()
             .map(|shape| {
-                let mut whole = vec![Vector::zeros(); positions.len()];
-                for &(v, delta) in &shape.deltas {
-                    whole[v as usize] = delta;
-                }
+                let whole = shape.spread(positions.len());
                 let at = |place: &SurfacePoint| {
                     let corners = triangles[place.triangle as usize].iter();
                     let shares = corners.zip(place.barycentric);

@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::delta_transfer::DeltaTransfer;
 use super::faces::OwnFace;
-use crate::mesh::Mesh;
 use crate::registration::{Registration, RegistrationError, RegistrationOptions, register};
 use crate::retarget::{
     Controls, FitFrame, FitOptions, ResponseModel, RetargetError, fit_clip, mesh_sites,
@@ -264,7 +263,7 @@ struct OwnPose {
 }
 
 fn own_poses(face: &OwnFace, template: &Template, registration: &Registration) -> Vec<OwnPose> {
-    let is_skin = skin_mask(&face.neutral, registration);
+    let is_part = registration.part_mask();
     let mut poses = Vec::new();
     for pose in POSES {
         let mut weights = vec![0.0; template.shapes.len()];
@@ -288,7 +287,7 @@ fn own_poses(face: &OwnFace, template: &Template, registration: &Registration) -
             continue;
         }
         let moved = (0..displacements.len())
-            .filter(|&v| is_skin[v] && displacements[v].norm() >= MOVED)
+            .filter(|&v| !is_part[v] && displacements[v].norm() >= MOVED)
             .collect();
         poses.push(OwnPose {
             pose,
@@ -298,16 +297,6 @@ fn own_poses(face: &OwnFace, template: &Template, registration: &Registration) -
         });
     }
     poses
-}
-
-fn skin_mask(mesh: &Mesh, registration: &Registration) -> Vec<bool> {
-    let mut is_skin = vec![true; mesh.vertex_count()];
-    for component in &registration.rigid_components {
-        for &v in &component.vertices {
-            is_skin[v as usize] = false;
-        }
-    }
-    is_skin
 }
 
 /// Displacements in the head frame. (mm)
@@ -422,21 +411,24 @@ fn compare(own: &OwnPose, method: &Method, drive: Drive, posed: &[Vector]) -> Po
     }
 }
 
-impl Table3 {
-    /// Mean and standard deviation over faces of a method's mean errors in a pose, or in all
-    /// poses where `pose` is `None`. (mm)
-    pub fn over_faces(&self, method: &str, pose: Option<&str>, drive: Drive) -> [f64; 2] {
-        let means: Vec<f64> = self
-            .faces
+impl FaceResult {
+    /// Mean over poses of a method's mean errors, or that of one pose; `None` where the face
+    /// has none. (mm)
+    pub fn mean(&self, method: &str, pose: Option<&str>, drive: Drive) -> Option<f64> {
+        let errors = self
+            .errors
             .iter()
-            .filter_map(|face| {
-                let errors = face.errors.iter().filter(|e| {
-                    e.method == method && e.drive == drive && pose.is_none_or(|p| p == e.pose)
-                });
-                let means: Vec<f64> = errors.map(|e| e.mean).collect();
-                (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
-            })
-            .collect();
+            .filter(|e| e.method == method && e.drive == drive && pose.is_none_or(|p| p == e.pose));
+        let means: Vec<f64> = errors.map(|e| e.mean).collect();
+        (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
+    }
+}
+
+impl Table3 {
+    /// Mean and standard deviation over faces of [`FaceResult::mean`]. (mm)
+    pub fn over_faces(&self, method: &str, pose: Option<&str>, drive: Drive) -> [f64; 2] {
+        let faces = self.faces.iter();
+        let means: Vec<f64> = faces.filter_map(|f| f.mean(method, pose, drive)).collect();
         let count = means.len().max(1) as f64;
         let mean = means.iter().sum::<f64>() / count;
         let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / count;

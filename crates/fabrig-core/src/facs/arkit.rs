@@ -75,6 +75,22 @@ pub enum ShapeMatch {
     Both(usize, usize),
 }
 
+impl ShapeMatch {
+    /// The shapes, as indices into [`ARKIT_SHAPES`], left before right.
+    pub fn shapes(self) -> Vec<usize> {
+        match self {
+            Self::One(shape) => vec![shape],
+            Self::Both(left, right) => vec![left, right],
+        }
+    }
+
+    /// Their names.
+    pub fn names(self) -> Vec<&'static str> {
+        let shapes = self.shapes().into_iter();
+        shapes.map(|shape| ARKIT_SHAPES[shape]).collect()
+    }
+}
+
 /// Finds the ARKit shape that `name` means.
 ///
 /// Letter case and separators do not matter (`EyeBlinkLeft`, `eye_blink_left`), a final `L`

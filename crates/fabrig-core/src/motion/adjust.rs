@@ -15,9 +15,7 @@ use std::collections::BTreeMap;
 
 use super::clip::ClipParts;
 use super::{Clip, MotionError};
-use crate::facs::{
-    ARKIT_SHAPES, JAW_OPEN, MOUTH_CLOSE, ShapeMatch, match_shape, mirrored_shape, nearest_name,
-};
+use crate::facs::{ARKIT_SHAPES, JAW_OPEN, MOUTH_CLOSE, match_shape, mirrored_shape, nearest_name};
 
 /// A neutral this strong leaves nothing of a shape to be told from noise.
 const MOST_NEUTRAL: f32 = 0.9;
@@ -95,8 +93,7 @@ impl Adjustment {
             }
             let shapes: Vec<usize> = match match_shape(name) {
                 _ if name == "all" => (0..ARKIT_SHAPES.len()).collect(),
-                Some(ShapeMatch::One(shape)) => vec![shape],
-                Some(ShapeMatch::Both(left, right)) => vec![left, right],
+                Some(found) => found.shapes(),
                 None => {
                     let nearest = nearest_name(name, ARKIT_SHAPES).unwrap_or_default();
                     return Err(format!(

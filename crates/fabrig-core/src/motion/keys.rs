@@ -26,7 +26,7 @@ use super::read::ReadOptions;
 use super::units::UnitChannels;
 use super::{Clip, ClipTracks, HeadPose, MotionError};
 use crate::Vector;
-use crate::facs::{ARKIT_SHAPES, ShapeMatch, Side, match_shape, match_unit, nearest_name};
+use crate::facs::{ARKIT_SHAPES, Side, match_shape, match_unit, nearest_name};
 
 /// First word of every keyed take.
 pub(super) const MAGIC: &str = "fabrig-keys";
@@ -381,10 +381,7 @@ fn channels(name: &str) -> Result<Vec<Channel>, String> {
         return Ok(sides.into_iter().map(channel).collect());
     }
     match match_shape(name) {
-        Some(ShapeMatch::One(shape)) => Ok(vec![Channel::Shape(shape)]),
-        Some(ShapeMatch::Both(left, right)) => {
-            Ok(vec![Channel::Shape(left), Channel::Shape(right)])
-        }
+        Some(found) => Ok(found.shapes().into_iter().map(Channel::Shape).collect()),
         None => {
             let known = ARKIT_SHAPES.into_iter().chain(OTHER_CHANNELS);
             let nearest = nearest_name(name, known).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::facs::{ARKIT_SHAPES, ShapeMatch, match_shape};
+use crate::facs::{ShapeMatch, match_shape};
 use crate::mesh::Mesh;
 use crate::mesh::io::{MeshIoError, read_mesh};
 use crate::rig::Expression;
@@ -78,11 +78,7 @@ pub fn read_own_shapes(
         if is_neutral(&stem) {
             continue;
         }
-        let names = match match_shape(&stem) {
-            Some(ShapeMatch::One(shape)) => vec![ARKIT_SHAPES[shape]],
-            Some(ShapeMatch::Both(left, right)) => vec![ARKIT_SHAPES[left], ARKIT_SHAPES[right]],
-            None => Vec::new(),
-        };
+        let names = match_shape(&stem).map_or_else(Vec::new, ShapeMatch::names);
         let mut weights = vec![0.0; template.shapes.len()];
         let shapes = names.iter().filter_map(|name| template.shape_index(name));
         shapes.for_each(|shape| weights[shape] = 1.0);

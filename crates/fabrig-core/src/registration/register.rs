@@ -88,6 +88,17 @@ pub struct Registration {
     pub rigid_components: Vec<RigidComponent>,
 }
 
+impl Registration {
+    /// For every vertex of the user's mesh whether it is of a piece that is not skin.
+    pub fn part_mask(&self) -> Vec<bool> {
+        let mut is_part = vec![false; self.face_points.len()];
+        for &v in self.rigid_components.iter().flat_map(|c| &c.vertices) {
+            is_part[v as usize] = true;
+        }
+        is_part
+    }
+}
+
 /// Registers `face`, any mesh of a head or face, to `template`.
 ///
 /// - `progress`: called between steps; `ControlFlow::Break` cancels

@@ -62,12 +62,7 @@ pub fn carry_expressions(
     let rest: Vec<Point> = face.positions().iter().map(|p| to_head * p).collect();
     let triangles = face.triangles();
     let surface = Surface::new(&rest, &triangles)?;
-    let mut is_part = vec![false; rest.len()];
-    for component in &registration.rigid_components {
-        for &v in &component.vertices {
-            is_part[v as usize] = true;
-        }
-    }
+    let is_part = registration.part_mask();
     let regions = &template.regions;
     let places: Vec<_> = registration
         .positions

@@ -34,6 +34,8 @@ pub(super) struct ShapesOnFace<'a> {
     face: FaceSide<'a>,
     offsets: FaceOffsets,
     muscles: Vec<Vec<MuscleShape>>,
+    /// What the patches do under the jaw: on the template, and on the face.
+    template_jaws: Vec<Option<JawField>>,
     jaws: Vec<Option<JawField>>,
     /// Amplitude of each patch without examples.
     priors: Vec<f64>,
@@ -72,6 +74,7 @@ impl<'a> ShapesOnFace<'a> {
             face,
             offsets,
             muscles: on_template.to_vec(),
+            template_jaws: jaws.clone(),
             jaws,
             priors: sizes.collect(),
             is_of_template: true,
@@ -98,6 +101,8 @@ impl<'a> ShapesOnFace<'a> {
         )?;
         if let Some(maps) = &self.offsets.maps {
             let triangles = face.template.skin.triangles();
+            // From the template anew: the maps are those of the whole way.
+            self.jaws.clone_from(&self.template_jaws);
             for (jaw, chart) in self.jaws.iter_mut().zip(&charts) {
                 let Some(jaw) = jaw else { continue };
                 jaw.map_residuals(|node| {
@@ -138,8 +143,8 @@ impl<'a> ShapesOnFace<'a> {
             template.shapes.len(),
             template.skin.vertex_count(),
         )?;
+        let jaw_shapes = JawShapes::of(template);
         if matches!(mode, AlphaMode::Map | AlphaMode::Own) {
-            let jaw_shapes = JawShapes::of(template);
             let sized: Vec<Matrix3<f64>> = self
                 .field_of(&self.priors)
                 .by_vertex()
@@ -149,20 +154,28 @@ impl<'a> ShapesOnFace<'a> {
             let offsets = self.offsets.mapped(sized);
             let maps = fit_maps(template, &jaw_shapes, &offsets.deltas, examples);
             self.offsets = offsets.mapped(maps);
+            if mode == AlphaMode::Own {
+                self.take_own_shapes(examples);
+            }
             self = self.sampled_on_face()?;
         }
         let (amplitudes, open_angle) = self.fit(examples, mode);
-        if mode == AlphaMode::Own {
-            self = self.with_own_shapes(examples, open_angle)?;
-            return Ok((self.transfers(&self.even()), open_angle));
+        let is_jaw = |example: &Example| {
+            let shape = example.shape().map(|shape| shape as u32);
+            shape.is_some() && shape == jaw_shapes.open
+        };
+        if mode == AlphaMode::Own && examples.iter().any(is_jaw) {
+            let hinge = JawHinge {
+                open_angle,
+                ..*self.face.hinge
+            };
+            self.jaws = split_jaws(&hinge, &jaw_shapes, &self.muscles, self.face.patches);
         }
         Ok((self.transfers(&amplitudes), open_angle))
     }
 
     /// The face's own shapes in the place of the template's, where it has them.
-    fn with_own_shapes(mut self, examples: &[Example], open_angle: f64) -> Result<Self, RigError> {
-        let jaw_shapes = JawShapes::of(self.face.template);
-        let mut has_own_jaw = false;
+    fn take_own_shapes(&mut self, examples: &[Example]) {
         for example in examples {
             let Some(shape) = example.shape() else {
                 continue;
@@ -173,20 +186,7 @@ impl<'a> ShapesOnFace<'a> {
                     *delta = *own;
                 }
             }
-            has_own_jaw |= jaw_shapes.open == Some(shape as u32);
         }
-        let jaws = std::mem::take(&mut self.jaws);
-        self.offsets.maps = None;
-        self = self.sampled_on_face()?;
-        self.jaws = jaws;
-        if has_own_jaw {
-            let hinge = JawHinge {
-                open_angle,
-                ..*self.face.hinge
-            };
-            self.jaws = split_jaws(&hinge, &jaw_shapes, &self.muscles, self.face.patches);
-        }
-        Ok(self)
     }
 
     fn field_of(&self, alphas: &[f64]) -> AlphaField {
@@ -252,6 +252,8 @@ impl<'a> ShapesOnFace<'a> {
         } = self.face;
         let sampler = ShapeSampler::new(template);
         let of_patches = self.field_of(&amplitudes.by_patch);
+        let mut pairs = amplitudes.by_patch.iter().zip(&amplitudes.by_shape);
+        let is_even = pairs.all(|(alpha, by_shape)| by_shape.iter().all(|a| a == alpha));
         // Neighbouring patches share one amplitude where they meet, shape by shape.
         let by_shape: Vec<Option<AlphaField>> = (0..template.shapes.len() as u32)
             .map(|shape| {
@@ -260,10 +262,6 @@ impl<'a> ShapesOnFace<'a> {
                     Some((&patches[p], amplitudes.by_shape[p][place]))
                 };
                 let known: Vec<_> = (0..patches.len()).filter_map(of_patch).collect();
-                let is_even = (0..patches.len()).all(|p| {
-                    let alphas = &amplitudes.by_shape[p];
-                    alphas.iter().all(|a| *a == amplitudes.by_patch[p])
-                });
                 (!is_even).then(|| AlphaField::new(template, known))
             })
             .collect();

@@ -236,13 +236,10 @@ impl TemplatePoser<'_> {
             turn: (rotation - nalgebra::Matrix3::identity()).cast(),
             shift: shift.cast(),
         });
-        let mut displacements = vec![nalgebra::Vector3::zeros(); self.template.skin.vertex_count()];
-        for &(vertex, delta) in &self.template.shapes[shape].deltas {
-            displacements[vertex as usize] = delta.cast();
-        }
+        let displacements = self.template.shapes[shape].spread(self.template.skin.vertex_count());
         Pose {
             affines,
-            displacements,
+            displacements: displacements.iter().map(|d| d.cast()).collect(),
         }
     }
 }

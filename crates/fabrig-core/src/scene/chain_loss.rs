@@ -155,10 +155,7 @@ pub fn shape_loss(
     posed: &[Point3<f32>],
 ) -> ShapeLoss {
     let shape = &template.shapes[shape];
-    let mut wanted = vec![Vector3::<f64>::zeros(); rest.len()];
-    for &(vertex, delta) in &shape.deltas {
-        wanted[vertex as usize] = delta;
-    }
+    let wanted = shape.spread(rest.len());
     let error = |v: usize| ((posed[v] - rest[v]).cast::<f64>() - wanted[v]).norm();
     let (moved, still): (Vec<usize>, Vec<usize>) =
         (0..rest.len()).partition(|&v| wanted[v].norm() >= MOVED);

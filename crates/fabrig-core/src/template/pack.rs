@@ -115,6 +115,17 @@ pub struct WholeFaceShape {
     pub deltas: Vec<(u32, Vector)>,
 }
 
+impl WholeFaceShape {
+    /// The displacement of every vertex of a skin of so many. (mm)
+    pub fn spread(&self, vertex_count: usize) -> Vec<Vector> {
+        let mut deltas = vec![Vector::zeros(); vertex_count];
+        for &(vertex, delta) in &self.deltas {
+            deltas[vertex as usize] = delta;
+        }
+        deltas
+    }
+}
+
 /// A template: skin, labels, rigid parts, shapes. Patch layout, action units and materials
 /// are read by the modules that use them from the text beside it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::anatomy::{PatchChart, SurfaceNode};
 use crate::mesh::vertex_normals;
-use crate::template::{Template, WholeFaceShape};
+use crate::template::Template;
 use crate::transfer::TransferError;
 use crate::{Point, Vector};
 
@@ -87,16 +87,7 @@ impl<'a> ShapeSampler<'a> {
         &self.triangles
     }
 
-    /// Spreads one shape over all vertices, with the normals it makes.
-    pub fn sample(&self, shape: &WholeFaceShape) -> SampledShape {
-        let mut deltas = vec![Vector::zeros(); self.rest.len()];
-        for &(vertex, delta) in &shape.deltas {
-            deltas[vertex as usize] = delta;
-        }
-        self.sample_deltas(deltas)
-    }
-
-    /// The same for a displacement of every vertex. (mm)
+    /// A displacement of every vertex (mm), with the change of normals that it makes.
     pub fn sample_deltas(&self, deltas: Vec<Vector>) -> SampledShape {
         let moved: Vec<Point> = self.rest.iter().zip(&deltas).map(|(p, d)| p + d).collect();
         let normals = smoothed_normals(&moved, &self.triangles, NORMAL_SMOOTHING_ROUNDS);
@@ -173,20 +164,16 @@ pub fn muscle_shapes(
     charts: &[PatchChart],
     threshold_mm: f64,
 ) -> Result<Vec<Vec<MuscleShape>>, TransferError> {
-    let sampler = ShapeSampler::new(template);
-    sampler.check(charts)?;
-    let sampled: Vec<SampledShape> = template
-        .shapes
-        .par_iter()
-        .map(|shape| sampler.sample(shape))
-        .collect();
-    Ok(on_patches(
+    let count = template.skin.vertex_count();
+    let shapes = template.shapes.iter();
+    let deltas: Vec<Vec<Vector>> = shapes.map(|shape| shape.spread(count)).collect();
+    muscle_shapes_on_face(
         template,
-        &sampler,
-        &sampled,
+        template.skin.positions(),
+        &deltas,
         charts,
         threshold_mm,
-    ))
+    )
 }
 
 /// As [`muscle_shapes`], of displacements that the template's shapes make on another face.
@@ -211,24 +198,8 @@ pub fn muscle_shapes_on_face(
         .par_iter()
         .map(|deltas| sampler.sample_deltas(deltas.clone()))
         .collect();
-    Ok(on_patches(
-        template,
-        &sampler,
-        &sampled,
-        charts,
-        threshold_mm,
-    ))
-}
-
-fn on_patches(
-    template: &Template,
-    sampler: &ShapeSampler<'_>,
-    sampled: &[SampledShape],
-    charts: &[PatchChart],
-    threshold_mm: f64,
-) -> Vec<Vec<MuscleShape>> {
     let of_chart = |chart: &PatchChart| {
-        let shapes = template.shapes.iter().zip(sampled).enumerate();
+        let shapes = template.shapes.iter().zip(&sampled).enumerate();
         shapes
             .filter_map(|(index, (shape, sampled))| {
                 let deltas = sampler.patch_deltas(sampled, chart);
@@ -241,5 +212,5 @@ fn on_patches(
             })
             .collect()
     };
-    charts.par_iter().map(of_chart).collect()
+    Ok(charts.par_iter().map(of_chart).collect())
 }

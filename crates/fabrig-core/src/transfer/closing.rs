@@ -55,10 +55,7 @@ impl<'a> LidClosing<'a> {
                 };
                 let shape = shapes.blink?;
                 let (upper, lower) = (member(upper), member(lower));
-                let mut deltas = vec![Vector::zeros(); template.skin.vertex_count()];
-                for &(v, d) in &template.shapes[shape as usize].deltas {
-                    deltas[v as usize] = d;
-                }
+                let deltas = template.shapes[shape as usize].spread(template.skin.vertex_count());
                 let pairs = meeting_pairs(template.skin.positions(), &deltas, &upper, &lower);
                 Some(LidPair {
                     shape,

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::evaluate::turn_with_jaw;
-use super::{ALPHA_LIMITS, JawField, JawShapes, MuscleShape, TransferError};
+use super::{ALPHA_LIMITS, JawField, JawShapes, MuscleShape};
 use crate::template::JawHinge;
 use crate::{Point, Vector};
 
@@ -50,19 +50,6 @@ pub enum AlphaMode {
     Own,
 }
 
-/// An expression of a face in the template's topology.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Example {
-    /// Name, for reports.
-    pub name: String,
-    /// Weights of the template's shapes that make it.
-    pub weights: Vec<f32>,
-    /// Displacement of every vertex from the neutral face. (mm, head frame)
-    pub deltas: Vec<Vector>,
-    /// Whether the displacement of a vertex is known.
-    pub is_seen: Vec<bool>,
-}
-
 /// Amplitudes of all patches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplitudes {
@@ -70,17 +57,6 @@ pub struct Amplitudes {
     pub by_patch: Vec<f64>,
     /// Alpha of each of its shapes, in the order of its muscle shapes.
     pub by_shape: Vec<Vec<f64>>,
-}
-
-impl Example {
-    /// The one shape that it is at weight 1, if it is.
-    pub fn shape(&self) -> Option<usize> {
-        let mut active = self.weights.iter().enumerate().filter(|(_, w)| **w != 0.0);
-        match (active.next(), active.next()) {
-            (Some((shape, &1.0)), None) => Some(shape),
-            _ => None,
-        }
-    }
 }
 
 impl Amplitudes {
@@ -112,47 +88,6 @@ pub struct Observation {
     pub weights: Vec<f32>,
     /// Displacements where they are known, shape `[patch_count][node_count]`. (mm)
     pub deltas: Vec<Vec<Option<Vector>>>,
-}
-
-/// Checks that examples fit the template.
-///
-/// # Errors
-///
-/// [`TransferError::Example`].
-pub fn check_examples(
-    examples: &[Example],
-    shape_count: usize,
-    vertex_count: usize,
-) -> Result<(), TransferError> {
-    for example in examples {
-        let wrong = |reason: String| TransferError::Example {
-            name: example.name.clone(),
-            reason,
-        };
-        if example.weights.len() != shape_count {
-            return Err(wrong(format!(
-                "it has {} weights, the template {shape_count} shapes",
-                example.weights.len()
-            )));
-        }
-        for found in [example.deltas.len(), example.is_seen.len()] {
-            if found != vertex_count {
-                return Err(wrong(format!(
-                    "it has {found} vertices, the template {vertex_count}"
-                )));
-            }
-        }
-        let is_finite = example.weights.iter().all(|w| w.is_finite())
-            && example
-                .deltas
-                .iter()
-                .flat_map(|d| d.iter())
-                .all(|c| c.is_finite());
-        if !is_finite {
-            return Err(wrong("it has numbers that are not finite".to_owned()));
-        }
-    }
-    Ok(())
 }
 
 /// The angle by which the hinge opens at weight 1 so that the patches turn as observed; the
@@ -495,19 +430,5 @@ mod tests {
         let angle = fit_open_angle(&own, &jaw, &[patch], &[seen]);
         assert!((angle - 0.3).abs() < 2e-3, "{angle}");
         assert_eq!(fit_open_angle(&own, &jaw, &[patch], &[]), own.open_angle);
-    }
-
-    #[test]
-    fn examples_that_do_not_fit_are_named() {
-        let example = Example {
-            name: "jawOpen".to_owned(),
-            weights: vec![1.0],
-            deltas: vec![Vector::new(f64::NAN, 0.0, 0.0)],
-            is_seen: vec![true],
-        };
-        for (shapes, vertices) in [(2, 1), (1, 2), (1, 1)] {
-            let error = check_examples(std::slice::from_ref(&example), shapes, vertices);
-            assert!(error.unwrap_err().to_string().contains("jawOpen"));
-        }
     }
 }

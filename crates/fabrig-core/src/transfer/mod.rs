@@ -19,6 +19,7 @@ mod blendshape;
 mod closing;
 mod error;
 mod evaluate;
+mod examples;
 mod fit_alpha;
 mod fit_maps;
 mod jaw;
@@ -35,9 +36,9 @@ pub use blendshape::{
 pub use closing::LidClosing;
 pub use error::TransferError;
 pub use evaluate::{PatchTransfer, ShapeWeights, TransferContext};
+pub use examples::{Example, check_examples};
 pub use fit_alpha::{
-    AlphaMode, Amplitudes, Example, Observation, PatchEvidence, check_examples, fit_alphas,
-    fit_open_angle,
+    AlphaMode, Amplitudes, Observation, PatchEvidence, fit_alphas, fit_open_angle,
 };
 pub use fit_maps::fit_maps;
 pub use jaw::{JawField, JawMode, JawPose};

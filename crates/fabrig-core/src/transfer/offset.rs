@@ -15,7 +15,7 @@ use super::TransferError;
 use super::blendshape::smoothed_normals;
 use super::poisson::PoissonTransfer;
 use crate::mesh::Topology;
-use crate::template::{Template, WholeFaceShape};
+use crate::template::Template;
 use crate::{Point, Vector};
 
 /// How a template's displacements are put on a face.
@@ -73,17 +73,17 @@ pub fn offsets_on_face(
     let shapes = template.shapes.iter();
     match mode {
         OffsetMode::Global => Ok(FaceOffsets {
-            deltas: shapes.map(|shape| spread(shape, count)).collect(),
+            deltas: shapes.map(|shape| shape.spread(count)).collect(),
             maps: None,
         }),
         OffsetMode::Frame => Ok(FaceOffsets {
-            deltas: shapes.map(|shape| spread(shape, count)).collect(),
+            deltas: shapes.map(|shape| shape.spread(count)).collect(),
             maps: None,
         }
         .mapped(local_maps(template, positions))),
         OffsetMode::DeformationTransfer => {
             let mut poisson = PoissonTransfer::new(template, positions)?;
-            let deltas = shapes.map(|shape| poisson.put(&spread(shape, count)));
+            let deltas = shapes.map(|shape| poisson.put(&shape.spread(count)));
             Ok(FaceOffsets {
                 deltas: deltas.collect::<Result<_, _>>()?,
                 maps: None,
@@ -107,15 +107,6 @@ impl FaceOffsets {
         });
         self
     }
-}
-
-/// A shape's displacement at every vertex.
-fn spread(shape: &WholeFaceShape, count: usize) -> Vec<Vector> {
-    let mut deltas = vec![Vector::zeros(); count];
-    for &(vertex, delta) in &shape.deltas {
-        deltas[vertex as usize] = delta;
-    }
-    deltas
 }
 
 /// At each vertex the matrix J that minimizes `sum |J e - e'|^2` over the edges `e` around it

@@ -118,11 +118,9 @@ fn print_table(console: &Console, table: &Table3) {
     for face in &table.faces {
         let mut line = format!("{:<24}", face.face);
         for method in METHODS {
-            let own = Table3 {
-                faces: vec![face.clone()],
-                refused: Vec::new(),
-            };
-            let [mean, _] = own.over_faces(method.name, None, Drive::Units);
+            let mean = face
+                .mean(method.name, None, Drive::Units)
+                .unwrap_or_default();
             line += &format!("{mean:>22.3}");
         }
         console.result(&line);
