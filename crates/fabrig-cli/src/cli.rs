@@ -103,9 +103,9 @@ pub(crate) struct RigArgs {
     /// Cut lips or lids apart that are one fused surface; what is new follows the mesh's vertices
     #[arg(long, value_enum, value_name = "OPENING", value_delimiter = ',')]
     pub(crate) cut_seams: Vec<Seam>,
-    /// The face's own expressions, to fit the muscles' amplitudes to: a folder of meshes in the
-    /// face's vertex order, named as ARKit's shapes
-    #[arg(long, value_name = "FOLDER")]
+    /// The face's own expressions, named as ARKit's shapes, to fit the muscles' amplitudes to: a
+    /// folder of meshes in the face's vertex order, or the morph targets of the face's own glTF
+    #[arg(long, value_name = "FOLDER|FACE.glb")]
     pub(crate) shapes: Option<PathBuf>,
     /// What is made of them: amplitudes are fitted, or more
     #[arg(
@@ -546,9 +546,9 @@ pub(crate) enum BenchCommand {
 
 #[derive(Debug, Args)]
 pub(crate) struct BenchTable3Args {
-    /// Folders with a neutral mesh (`neutral.obj`) and shapes named as ARKit's, instead of the
-    /// bundled synthetic faces
-    #[arg(value_name = "FOLDER")]
+    /// Faces with their own shapes, named as ARKit's, instead of the bundled synthetic ones:
+    /// folders with a neutral mesh (`neutral.obj`), or glTF files with morph targets
+    #[arg(value_name = "FOLDER|FACE.glb")]
     pub(crate) folders: Vec<PathBuf>,
     /// Only bundled faces whose name has this in it
     #[arg(long, value_name = "TEXT", default_value = "")]

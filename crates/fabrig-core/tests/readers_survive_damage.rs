@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use fabrig_core::mesh::io::{MeshIoError, read_mesh};
+use fabrig_core::mesh::io::{MeshIoError, read_mesh_with_shapes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -69,16 +69,42 @@ fn gltf(nodes: &str) -> Vec<u8> {
       "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":6}],
       "buffers":[{"byteLength":44}]}"#
         .replace("NODES", nodes);
-    let mut text = json.into_bytes();
-    while !text.len().is_multiple_of(4) {
-        text.push(b' ');
-    }
     let mut data: Vec<u8> = [0f32, 0., 0., 1., 0., 0., 0., 1., 0.]
         .iter()
         .flat_map(|c| c.to_le_bytes())
         .collect();
     data.extend([0u16, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
     data.extend([0, 0]);
+    glb(json, &data)
+}
+
+/// A triangle with a dense and a sparse morph target on two primitives.
+fn gltf_with_shapes() -> Vec<u8> {
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0,"scale":[1,2,1]}],
+      "scenes":[{"nodes":[0]}],
+      "meshes":[{"extras":{"targetNames":["jawOpen","hat"]},"primitives":[
+        {"attributes":{"POSITION":0},"targets":[{"POSITION":1},{"POSITION":2}]},
+        {"attributes":{"POSITION":1},"targets":[{"POSITION":2},{}]}]}],
+      "accessors":[
+        {"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+        {"bufferView":1,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+        {"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":2,
+          "indices":{"bufferView":2,"componentType":5123},"values":{"bufferView":3}}}],
+      "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36},
+        {"buffer":0,"byteOffset":72,"byteLength":4},{"buffer":0,"byteOffset":76,"byteLength":24}],
+      "buffers":[{"byteLength":100}]}"#;
+    let floats = |count: u32| (0..count).flat_map(|c| (c as f32 * 0.5).to_le_bytes());
+    let mut data: Vec<u8> = floats(18).collect();
+    data.extend([0, 0, 2, 0]);
+    data.extend(floats(6));
+    glb(json.to_owned(), &data)
+}
+
+fn glb(json: String, data: &[u8]) -> Vec<u8> {
+    let mut text = json.into_bytes();
+    while !text.len().is_multiple_of(4) {
+        text.push(b' ');
+    }
     let mut glb = b"glTF".to_vec();
     glb.extend(2u32.to_le_bytes());
     glb.extend((12 + 8 + text.len() as u32 + 8 + data.len() as u32).to_le_bytes());
@@ -87,7 +113,7 @@ fn gltf(nodes: &str) -> Vec<u8> {
     glb.extend(text);
     glb.extend((data.len() as u32).to_le_bytes());
     glb.extend(b"BIN\0");
-    glb.extend(data);
+    glb.extend_from_slice(data);
     glb
 }
 
@@ -139,9 +165,17 @@ fn mutate(seed: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
 fn read(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), MeshIoError> {
     let path = folder.join(name);
     std::fs::write(&path, bytes).expect("written");
-    let mesh = read_mesh(&path)?;
-    // Bounded: no more than a file of this size can hold.
-    assert!(mesh.vertex_count() <= bytes.len() && mesh.face_count() <= bytes.len());
+    let file = read_mesh_with_shapes(&path)?;
+    // Bounded: no more than a file of this size can hold (buffers are the file's own).
+    let displacements: usize = file.shapes.iter().map(|s| s.deltas.len()).sum();
+    let largest = 2 * bytes.len();
+    assert!(file.mesh.vertex_count() <= largest && file.mesh.face_count() <= largest);
+    assert!(displacements <= largest);
+    assert!(file.shapes.iter().all(|shape| {
+        let positions = shape.positions(&file.mesh);
+        positions.len() == file.mesh.vertex_count()
+            && positions.iter().all(|p| p.iter().all(|c| c.is_finite()))
+    }));
     Ok(())
 }
 
@@ -155,6 +189,7 @@ fn no_mutation_makes_a_reader_panic() {
         ("a.stl", stl_binary()),
         ("b.stl", STL.as_bytes().to_vec()),
         ("a.glb", gltf(ONE_NODE)),
+        ("b.glb", gltf_with_shapes()),
     ]
     .into_iter()
     .enumerate()

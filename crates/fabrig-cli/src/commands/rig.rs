@@ -38,7 +38,7 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
     }
     options.rig.alpha = args.alpha.into();
     let own = match &args.shapes {
-        Some(folder) => Some(read_own_shapes(folder, &face, template::human())?),
+        Some(source) => Some(read_own_shapes(source, &face, template::human())?),
         None => None,
     };
     if let Some(own) = &own {

@@ -30,6 +30,6 @@ mod timing;
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
-pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_folder, read_own_shapes};
+pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use timing::TimeStatistics;

@@ -1,23 +1,24 @@
-//! A face's own expressions from a folder: one mesh a shape, named as ARKit names it.
+//! A face's own expressions, named as ARKit names them: a folder with one mesh a shape, or a
+//! glTF file whose morph targets they are.
 
 use std::path::{Path, PathBuf};
 
-use crate::facs::{ShapeMatch, match_shape};
+use crate::facs::match_shape;
 use crate::mesh::Mesh;
-use crate::mesh::io::{MeshIoError, read_mesh};
+use crate::mesh::io::{MeshIoError, read_mesh, read_mesh_with_shapes};
 use crate::rig::Expression;
 use crate::template::Template;
 
 /// Expressions of a face, and files that are none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OwnShapes {
-    /// In the order of file names.
+    /// In the order of file names, or of the file's morph targets.
     pub expressions: Vec<Expression>,
-    /// Meshes that were passed over, and why.
+    /// Meshes and morph targets (`face.glb#hat`) that were passed over, and why.
     pub skipped: Vec<(PathBuf, String)>,
 }
 
-/// What can go wrong when a folder of shapes is read.
+/// What can go wrong when shapes are read.
 #[derive(Debug, thiserror::Error)]
 pub enum OwnShapesError {
     /// The folder cannot be read.
@@ -46,77 +47,164 @@ pub enum OwnShapesError {
         /// The shape's.
         found: usize,
     },
-    /// Nothing in the folder is a shape.
+    /// Nothing in the folder or file is a shape.
     #[error(
-        "{} has no mesh that is named like one of ARKit's 52 shapes (jawOpen.obj, \
-         mouthSmile_L.obj, ...)",
+        "{} has no mesh or morph target that is named like one of ARKit's 52 shapes (jawOpen, \
+         mouthSmile_L, ...)",
         path.display()
     )]
     Nothing {
-        /// The folder.
+        /// The folder or file.
         path: PathBuf,
+    },
+    /// The mesh that the morph targets stand on is another one than the neutral face.
+    #[error(
+        "{}: vertex {vertex} is {distance:.3} units off the neutral face: rig the face from this \
+         very file, so that its morph targets are in the same units and place",
+        path.display()
+    )]
+    OtherRest {
+        /// The file.
+        path: PathBuf,
+        /// The vertex that is farthest off.
+        vertex: usize,
+        /// How far, in units of the neutral face.
+        distance: f64,
     },
 }
 
 const EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
 
-/// Reads every mesh of a folder that is named like a shape of the template.
+/// A vertex of a file with morph targets may be this far from the neutral face, as a share of
+/// the face's size: formats round.
+const REST_TOLERANCE: f64 = 1e-4;
+
+/// Reads the shapes of a face that are shapes of the template too: every mesh of a folder that
+/// is named like one, or every morph target of a glTF file.
 ///
+/// - `source`: the folder or file
 /// - `neutral`: the face at rest, whose vertices every shape has
 ///
 /// # Errors
 ///
 /// [`OwnShapesError`].
 pub fn read_own_shapes(
-    folder: &Path,
+    source: &Path,
     neutral: &Mesh,
     template: &Template,
 ) -> Result<OwnShapes, OwnShapesError> {
     let mut found = OwnShapes::default();
-    for path in mesh_files(folder)? {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        if is_neutral(&stem) {
-            continue;
-        }
-        let names = match_shape(&stem).map_or_else(Vec::new, ShapeMatch::names);
-        let mut weights = vec![0.0; template.shapes.len()];
-        let shapes = names.iter().filter_map(|name| template.shape_index(name));
-        shapes.for_each(|shape| weights[shape] = 1.0);
-        if weights.iter().all(|w| *w == 0.0) {
-            let reason = "its name is no shape of ARKit".to_owned();
-            found.skipped.push((path, reason));
-            continue;
-        }
-        let mesh = read_mesh(&path)?;
-        if mesh.vertex_count() != neutral.vertex_count() {
-            return Err(OwnShapesError::VertexCount {
-                path,
-                expected: neutral.vertex_count(),
-                found: mesh.vertex_count(),
-            });
-        }
-        found.expressions.push(Expression {
-            name: names.join("+"),
-            weights,
-            positions: mesh.positions().to_vec(),
-        });
+    if source.is_file() {
+        read_morph_targets(source, neutral, template, &mut found)?;
+    } else {
+        read_folder(source, neutral, template, &mut found)?;
     }
     if found.expressions.is_empty() {
         return Err(OwnShapesError::Nothing {
-            path: folder.to_owned(),
+            path: source.to_owned(),
         });
     }
     Ok(found)
 }
 
-/// The mesh of a folder that is named as its neutral (`neutral.obj`,
-/// `generic_neutral_mesh.obj`); `None` where there is none, or more than one.
+fn read_folder(
+    folder: &Path,
+    neutral: &Mesh,
+    template: &Template,
+    found: &mut OwnShapes,
+) -> Result<(), OwnShapesError> {
+    for path in mesh_files(folder)? {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        if is_neutral(&stem) {
+            continue;
+        }
+        let Some((name, weights)) = shapes_of_name(&stem, template) else {
+            found.skipped.push((path, NO_SHAPE.to_owned()));
+            continue;
+        };
+        let mesh = read_mesh(&path)?;
+        check_count(&path, &mesh, neutral)?;
+        found.expressions.push(Expression {
+            name,
+            weights,
+            positions: mesh.positions().to_vec(),
+        });
+    }
+    Ok(())
+}
+
+fn read_morph_targets(
+    path: &Path,
+    neutral: &Mesh,
+    template: &Template,
+    found: &mut OwnShapes,
+) -> Result<(), OwnShapesError> {
+    let file = read_mesh_with_shapes(path)?;
+    check_count(path, &file.mesh, neutral)?;
+    let pairs = neutral.positions().iter().zip(file.mesh.positions());
+    let distances = pairs.map(|(p, q)| (p - q).norm()).enumerate();
+    let (vertex, distance) = distances
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((0, 0.0));
+    let middle = neutral.positions()[0];
+    let size = neutral.positions().iter().map(|p| (p - middle).norm());
+    if distance > REST_TOLERANCE * size.fold(0.0, f64::max) {
+        return Err(OwnShapesError::OtherRest {
+            path: path.to_owned(),
+            vertex,
+            distance,
+        });
+    }
+    for shape in &file.shapes {
+        let Some((name, weights)) = shapes_of_name(&shape.name, template) else {
+            let target = format!("{}#{}", path.display(), shape.name);
+            found.skipped.push((target.into(), NO_SHAPE.to_owned()));
+            continue;
+        };
+        found.expressions.push(Expression {
+            name,
+            weights,
+            positions: shape.positions(neutral),
+        });
+    }
+    Ok(())
+}
+
+const NO_SHAPE: &str = "its name is no shape of ARKit";
+
+/// The template's shapes that a name means, as one name and as weights.
+fn shapes_of_name(name: &str, template: &Template) -> Option<(String, Vec<f32>)> {
+    let names = match_shape(name)?.names();
+    let mut weights = vec![0.0; template.shapes.len()];
+    let shapes = names.iter().filter_map(|name| template.shape_index(name));
+    shapes.for_each(|shape| weights[shape] = 1.0);
+    let is_known = weights.contains(&1.0);
+    is_known.then(|| (names.join("+"), weights))
+}
+
+fn check_count(path: &Path, mesh: &Mesh, neutral: &Mesh) -> Result<(), OwnShapesError> {
+    if mesh.vertex_count() == neutral.vertex_count() {
+        return Ok(());
+    }
+    Err(OwnShapesError::VertexCount {
+        path: path.to_owned(),
+        expected: neutral.vertex_count(),
+        found: mesh.vertex_count(),
+    })
+}
+
+/// The mesh that shapes stand on: a file itself, or the mesh of a folder that is named as its
+/// neutral (`neutral.obj`, `generic_neutral_mesh.obj`); `None` where there is none, or more
+/// than one.
 ///
 /// # Errors
 ///
 /// [`OwnShapesError::Io`].
-pub fn neutral_of_folder(folder: &Path) -> Result<Option<PathBuf>, OwnShapesError> {
-    let mut neutrals = mesh_files(folder)?;
+pub fn neutral_of_shapes(source: &Path) -> Result<Option<PathBuf>, OwnShapesError> {
+    if source.is_file() {
+        return Ok(Some(source.to_owned()));
+    }
+    let mut neutrals = mesh_files(source)?;
     neutrals.retain(|path| is_neutral(&path.file_stem().unwrap_or_default().to_string_lossy()));
     Ok((neutrals.len() == 1).then(|| neutrals.remove(0)))
 }
@@ -177,7 +265,7 @@ mod tests {
         let names: Vec<&str> = found.expressions.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(names, ["browInnerUp", "mouthSmileLeft"]);
         assert_eq!(found.skipped.len(), 1);
-        let path = neutral_of_folder(&folder).unwrap().unwrap();
+        let path = neutral_of_shapes(&folder).unwrap().unwrap();
         assert!(path.ends_with("My_Neutral.obj"));
         let square = Mesh::from_triangles(
             [corner.as_slice(), &[[1.0, 1.0, 0.0].into()]].concat(),
@@ -191,5 +279,38 @@ mod tests {
             "{error}"
         );
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn morph_targets_of_the_face_s_own_file_are_shapes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("face.gltf");
+        let floats = [
+            0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 0., 0., -1., 0., 0., 0., 0.,
+        ];
+        let bytes: Vec<u8> = floats.iter().flat_map(|c| c.to_le_bytes()).collect();
+        std::fs::write(folder.path().join("face.bin"), bytes).unwrap();
+        let json = r#"{"asset": {"version": "2.0"},
+            "meshes": [{"extras": {"targetNames": ["blends.mouthSmile", "hat", "jaw_open"]},
+              "primitives": [{"attributes": {"POSITION": 0},
+                "targets": [{"POSITION": 1}, {"POSITION": 1}, {"POSITION": 1}]}]}],
+            "accessors": [
+              {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+               "min": [0, 0, 0], "max": [1, 1, 0]},
+              {"bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 3,
+               "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 72}],
+            "buffers": [{"uri": "face.bin", "byteLength": 72}]}"#;
+        std::fs::write(&path, json).unwrap();
+        let neutral = read_mesh(neutral_of_shapes(&path).unwrap().unwrap()).unwrap();
+        let found = read_own_shapes(&path, &neutral, human()).unwrap();
+        let names: Vec<&str> = found.expressions.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["mouthSmileLeft+mouthSmileRight", "jawOpen"]);
+        assert_eq!(found.expressions[1].positions[1], [1.0, -1.0, 0.0].into());
+        assert!(found.skipped[0].0.ends_with("face.gltf#hat"));
+        let larger = neutral.positions().iter().map(|p| p * 1000.0).collect();
+        let larger = neutral.with_positions(larger).unwrap();
+        let error = read_own_shapes(&path, &larger, human()).unwrap_err();
+        assert!(matches!(error, OwnShapesError::OtherRest { .. }), "{error}");
     }
 }

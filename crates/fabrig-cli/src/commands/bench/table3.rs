@@ -7,7 +7,7 @@ use fabrig_core::evaluation::{
     Drive, METHODS, OwnFace, POSES, Table3, Table3Error, evaluate_face, synthetic_faces,
 };
 use fabrig_core::mesh::io::read_mesh;
-use fabrig_core::pipeline::{neutral_of_folder, read_own_shapes};
+use fabrig_core::pipeline::{neutral_of_shapes, read_own_shapes};
 use fabrig_core::template::{self, Template};
 
 use crate::cli::BenchTable3Args;
@@ -61,22 +61,22 @@ pub(crate) fn run(console: &Console, args: &BenchTable3Args) -> Result<Outcome> 
     })
 }
 
-fn read_face(console: &Console, folder: &Path, template: &Template) -> Result<OwnFace> {
-    let path = neutral_of_folder(folder)?.ok_or_else(|| {
+fn read_face(console: &Console, source: &Path, template: &Template) -> Result<OwnFace> {
+    let path = neutral_of_shapes(source)?.ok_or_else(|| {
         anyhow!(
-            "{}: one mesh with 'neutral' in its name is needed",
-            folder.display()
+            "{}: a folder needs one mesh with 'neutral' in its name",
+            source.display()
         )
     })?;
     let neutral = read_mesh(&path)?;
-    let own = read_own_shapes(folder, &neutral, template)
+    let own = read_own_shapes(source, &neutral, template)
         .with_context(|| format!("shapes of {}", path.display()))?;
     for (path, reason) in &own.skipped {
         console.note(&format!("{} passed over: {reason}", path.display()));
     }
     Ok(OwnFace {
-        name: folder.file_name().map_or_else(
-            || folder.display().to_string(),
+        name: source.file_name().map_or_else(
+            || source.display().to_string(),
             |name| name.to_string_lossy().into_owned(),
         ),
         is_synthetic: false,

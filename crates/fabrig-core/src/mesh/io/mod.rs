@@ -1,18 +1,21 @@
 //! Mesh files: Wavefront OBJ, PLY, STL and glTF in, OBJ out.
 //!
 //! [`read_mesh`] picks the format by the file's extension. Vertices keep the file's order and
-//! units, polygons stay polygons. Anything wrong with a file is a [`MeshIoError`] that names
+//! units, polygons stay polygons. [`read_mesh_with_shapes`] also gives glTF's morph targets. Anything wrong with a file is a [`MeshIoError`] that names
 //! the file and, where the format has them, the line.
 
 mod error;
 mod gltf;
+mod gltf_accessor;
 mod obj;
 mod ply;
 mod read;
+mod shapes;
 mod stl;
 mod write;
 
 pub use error::{MeshIoError, ObjProblem};
 pub use obj::parse_obj;
 pub use read::read_mesh;
+pub use shapes::{MeshShape, MeshWithShapes, read_mesh_with_shapes};
 pub use write::write_obj;

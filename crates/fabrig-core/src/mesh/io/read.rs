@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{MeshIoError, gltf, obj, ply, stl};
+use super::{MeshIoError, MeshWithShapes, gltf, obj, ply, stl};
 use crate::mesh::Mesh;
 
 /// Reads a mesh file: `.obj`, `.ply`, `.stl`, `.gltf` or `.glb`, in any case.
@@ -15,16 +15,21 @@ use crate::mesh::Mesh;
 /// [`MeshIoError`]: the file is missing, of an unknown kind, malformed, empty, has a
 /// coordinate that is not finite, or an index that is out of range.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, MeshIoError> {
-    let path = path.as_ref();
+    Ok(read(path.as_ref())?.mesh)
+}
+
+/// The mesh with its shapes.
+pub(super) fn read(path: &Path) -> Result<MeshWithShapes, MeshIoError> {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
         .unwrap_or_default();
-    let read: fn(&[u8], &Path) -> Result<Mesh, MeshIoError> = match extension.as_str() {
+    type Parse = fn(&[u8], &Path) -> Result<MeshWithShapes, MeshIoError>;
+    let parse: Parse = match extension.as_str() {
         // Names may be in any encoding; everything that matters is ASCII.
-        "obj" => |bytes, path| obj::parse_obj(&String::from_utf8_lossy(bytes), path),
-        "ply" => ply::parse_ply,
-        "stl" => stl::parse_stl,
+        "obj" => |bytes, path| Ok(obj::parse_obj(&String::from_utf8_lossy(bytes), path)?.into()),
+        "ply" => |bytes, path| Ok(ply::parse_ply(bytes, path)?.into()),
+        "stl" => |bytes, path| Ok(stl::parse_stl(bytes, path)?.into()),
         "gltf" | "glb" => gltf::parse_gltf,
         _ => {
             return Err(MeshIoError::UnknownFormat {
@@ -37,7 +42,7 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, MeshIoError> {
         path: path.to_owned(),
         source,
     })?;
-    read(&bytes, path)
+    parse(&bytes, path)
 }
 
 #[cfg(test)]
