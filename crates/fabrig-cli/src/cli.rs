@@ -4,6 +4,7 @@ use fabrig_core::transfer::{AlphaMode, OffsetMode};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use fabrig_core::evaluation::{CheckGates, GATES};
 use fabrig_core::motion::TakeFormat;
 use fabrig_core::recording::RecordingOptions;
 
@@ -23,6 +24,8 @@ pub(crate) enum Command {
     Animate(AnimateArgs),
     /// Rig and animate the bundled face with the bundled take
     Demo(DemoArgs),
+    /// Say whether every shape of a rig does on its face what it should; exit code 3 where not
+    Check(CheckArgs),
     /// Fit the shapes of a rig to markers or an animated mesh, and write the take
     Retarget(RetargetArgs),
     /// Look at and change single muscles of a rig
@@ -337,6 +340,28 @@ pub(crate) struct AnimateArgs {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// Rig, as `fabrig rig` makes it; edits beside it are applied
+    pub(crate) rig: PathBuf,
+    /// Folder of the template that it was made with [default: the bundled one]
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) template: Option<PathBuf>,
+    /// Hold each shape by the cloth, with contact of lips and lids, instead of looking at it as
+    /// the muscles have it
+    #[arg(long)]
+    pub(crate) contact: bool,
+    /// Limit of a gate, as listed in `docs/check.md`; may be repeated
+    #[arg(long, value_name = "GATE=LIMIT", value_parser = parse_gate)]
+    pub(crate) gate: Vec<(String, f64)>,
+    /// Also write one page with pictures of every shape
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct RetargetArgs {
     /// Markers as C3D or TRC; or the rig's own mesh in motion: a folder of OBJ files, or .npy
     /// with shape (frames, vertices, 3)
@@ -637,6 +662,20 @@ fn parse_gain(text: &str) -> Result<(String, f64), String> {
     }
 }
 
+fn parse_gate(text: &str) -> Result<(String, f64), String> {
+    let (name, limit) = text.split_once('=').unwrap_or((text, ""));
+    let name = name.trim().replace('-', "_");
+    let limit = limit.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    if CheckGates::default().get(&name).is_none() {
+        let names: Vec<&str> = GATES.iter().map(|gate| gate.name).collect();
+        return Err(format!("gates are {}", names.join(", ")));
+    }
+    match limit {
+        Some(limit) => Ok((name, limit)),
+        None => Err("expected GATE=LIMIT with a number".to_owned()),
+    }
+}
+
 fn parse_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate.is_finite() && rate >= 0.0 => Ok(rate),
@@ -679,6 +718,10 @@ mod tests {
         }
         for bad in ["", "jawOpen", "jawOpen=-1", "jawOpen=inf"] {
             assert!(parse_gain(bad).is_err(), "{bad}");
+        }
+        assert_eq!(parse_gate("leak-mm=0.3"), Ok(("leak_mm".to_owned(), 0.3)));
+        for bad in ["", "leak_mm", "leak_mm=x", "leek_mm=1"] {
+            assert!(parse_gate(bad).is_err(), "{bad}");
         }
     }
 

@@ -26,6 +26,8 @@ pub enum Error {
     #[error(transparent)]
     OwnShapes(#[from] crate::pipeline::OwnShapesError),
     #[error(transparent)]
+    Check(#[from] crate::evaluation::CheckError),
+    #[error(transparent)]
     Evaluation(#[from] crate::evaluation::Table3Error),
     #[error(transparent)]
     Edit(#[from] crate::edit::EditError),

@@ -90,6 +90,7 @@ pub(crate) fn to_py(error: impl Into<Error>) -> PyErr {
         Error::Template(_) => TemplateError::new_err(message),
         Error::Registration(_) => RegistrationError::new_err(message),
         Error::Rig(_)
+        | Error::Check(_)
         | Error::Edit(_)
         | Error::Anatomy(_)
         | Error::Transfer(_)

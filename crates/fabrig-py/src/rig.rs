@@ -5,13 +5,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fabrig_core::edit::{Edits, load_edited_rig};
+use fabrig_core::evaluation::{CheckGates, GATES, check_rig};
 use fabrig_core::rig::Rig;
-use numpy::PyArray2;
+use fabrig_core::scene::Scene;
+use fabrig_core::template;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::errors::{input, to_py};
 use crate::mesh::PyMesh;
+use crate::progress::Progress;
 
 /// A face that is ready to move.
 #[pyclass(frozen, name = "Rig", module = "fabrig")]
@@ -121,6 +125,58 @@ impl PyRig {
         let text = self.inner.registration_report.as_str();
         let text = if text.is_empty() { "{}" } else { text };
         py.import("json")?.call_method1("loads", (text,))
+    }
+
+    /// Whether every shape does on this face what it should: the report of `fabrig check`, as a
+    /// dictionary, with `passes`, the `distances` of all vertices from the registered template
+    /// [mm, NaN for parts that are no skin], shape (N,), and `marked`: shape name -> vertices
+    /// that findings are about.
+    ///
+    /// - `gates`: limit by name, instead of the defaults
+    /// - `progress`: called with ("check", share)
+    #[pyo3(signature = (*, gates=None, progress=None))]
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+        gates: Option<BTreeMap<String, f64>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut limits = CheckGates::default();
+        for (name, limit) in gates.unwrap_or_default() {
+            if !limit.is_finite() || !limits.set(&name, limit) {
+                let names: Vec<&str> = GATES.iter().map(|gate| gate.name).collect();
+                return Err(input(format!(
+                    "gates: '{name}' = {limit} is not a limit of one of {}",
+                    names.join(", ")
+                )));
+            }
+        }
+        let mut progress = Progress::new(progress);
+        let count = self.inner.shape_names.len() as f64;
+        let check = py.detach(|| {
+            let scene = Scene::without_dynamics();
+            check_rig(
+                &self.inner,
+                template::human(),
+                &limits,
+                &scene,
+                &mut |shape| progress.report("check", shape as f64 / count),
+            )
+        });
+        progress.finish()?;
+        let check = check.map_err(to_py)?;
+        let report = arrays::to_python(py, &check.report)?;
+        report.set_item("passes", check.report.passes())?;
+        let distances = check.distances.iter();
+        let distances: Vec<f64> = distances.map(|d| d.unwrap_or(f64::NAN)).collect();
+        report.set_item("distances", PyArray1::from_vec(py, distances))?;
+        let names = self.inner.shape_names.iter().cloned();
+        let marked: BTreeMap<String, Vec<u32>> = names
+            .zip(check.marked)
+            .filter(|(_, vertices)| !vertices.is_empty())
+            .collect();
+        report.set_item("marked", marked)?;
+        Ok(report)
     }
 
     fn __repr__(&self) -> String {

@@ -43,6 +43,20 @@ def test_rest_stays_and_the_jaw_opens(rig):
             simulation.step(dt)
 
 
+def test_a_rig_is_checked_and_gates_can_be_moved(rig):
+    report = rig.check()
+    assert report["passes"] and report["findings"] == [] and report["marked"] == {}
+    assert [s["shape"] for s in report["shapes"]] == rig.shape_names
+    assert report["distances"].shape == (len(rig.mesh.vertices),)
+    assert np.nanmedian(report["distances"]) < 0.5
+    strict = rig.check(gates={"leak_mm": 0.0})
+    assert not strict["passes"]
+    assert {f["gate"] for f in strict["findings"]} == {"leak_mm"}
+    for gates in ({"leek_mm": 1.0}, {"leak_mm": float("nan")}):
+        with pytest.raises(fabrig.InputError, match="gates"):
+            rig.check(gates=gates)
+
+
 def test_the_readme_example_runs(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     code = re.search(r"```python\n(.*?)```", README.read_text(), re.S).group(1)

@@ -2,9 +2,11 @@
 
 mod animate;
 mod bench;
+mod check;
 mod contact_pictures;
 mod demo;
 mod edit;
+mod html;
 mod info;
 mod pose;
 mod render;
@@ -16,9 +18,11 @@ mod template;
 mod viewers;
 mod zoom;
 
+use std::borrow::Cow;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use fabrig_core::template::{Template, human};
 
 use crate::cli::Command;
 use crate::console::Console;
@@ -38,6 +42,7 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
         Command::Rig(args) => rig::run(console, &args),
         Command::Animate(args) => animate::run(console, &args),
         Command::Demo(args) => demo::run(console, &args),
+        Command::Check(args) => check::run(console, &args),
         Command::Retarget(args) => retarget::run(console, &args),
         Command::Edit(command) => edit::run(console, &command),
         Command::Render(args) => render::run(console, &args),
@@ -64,6 +69,17 @@ fn check_output(path: &Path) -> Result<()> {
         bail!("cannot write {}: it is a folder", path.display());
     }
     Ok(())
+}
+
+/// The template in a folder, or the bundled one.
+fn template_of(folder: Option<&Path>) -> Result<Cow<'static, Template>> {
+    Ok(match folder {
+        Some(folder) => Cow::Owned(
+            Template::load(folder)
+                .with_context(|| format!("{} cannot be used", folder.display()))?,
+        ),
+        None => Cow::Borrowed(human()),
+    })
 }
 
 /// The name of a file without folder and extension.

@@ -3,15 +3,16 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use fabrig_core::Point;
-use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::mesh::{Mesh, Surface};
 use fabrig_core::pipeline::RiggedFace;
 use fabrig_core::registration::{DistanceStatistics, OpeningMeasure, OpeningState};
 use fabrig_core::render::{
     ColorMap, FaceLook, Image, Layer, Legend, Paint, Picture, Sheet, View, mesh_layers,
 };
+
+use super::html::{Figures, escape, page_of, write_page};
 
 /// The colours end here. (mm)
 const WORST_SHOWN_MM: f64 = 2.0;
@@ -34,9 +35,7 @@ pub(super) fn write(path: &Path, source: &Path, rigged: &RiggedFace) -> Result<(
             sheet.compose(columns as u32)?.save_png(path)?;
         }
         Some("html" | "htm") => {
-            let text = page(source, rigged, &pictures)?;
-            write_atomically(path, |out| out.write_all(text.as_bytes()))
-                .with_context(|| format!("cannot write {}", path.display()))?;
+            write_page(path, &page(source, rigged, &pictures)?)?;
         }
         _ => bail!("{}: a report is written as .html or .png", path.display()),
     }
@@ -154,32 +153,13 @@ fn page(source: &Path, rigged: &RiggedFace, pictures: &[(Image, String)]) -> Res
     }
     row("time", format!("{:.2} s", report.total_seconds()));
 
-    let mut figures = String::new();
-    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
-    let file = folder.path().join("picture.png");
+    let mut figures = Figures::new()?;
     for (image, caption) in pictures {
-        image.save_png(&file)?;
-        let bytes = std::fs::read(&file).context("cannot read a picture back")?;
-        let _ = writeln!(
-            figures,
-            "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}\
-             </figcaption></figure>",
-            escape(caption),
-            base64(&bytes)
-        );
+        figures.push(image, caption)?;
     }
-    Ok(format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\n\
-         <style>body{{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:1100px;\
-         padding:0 1em;color:#222;background:#fafbfc}}h1{{font-size:1.3em}}\
-         .pictures{{display:grid;grid-template-columns:repeat(3,1fr);gap:8px}}\
-         figure{{margin:0}}img{{width:100%}}figcaption{{font-size:.85em;color:#555}}\
-         table{{border-collapse:collapse;margin-top:1.5em}}th,td{{text-align:left;\
-         padding:.25em .9em .25em 0;border-bottom:1px solid #ddd;vertical-align:top}}\
-         th{{white-space:nowrap;font-weight:600}}</style></head>\n\
-         <body><h1>{title}</h1>\n<div class=\"pictures\">\n{figures}</div>\n\
-         <table>\n{rows}</table></body></html>\n",
-        title = escape(&format!("Face report: {}", source.display()))
+    Ok(page_of(
+        &format!("Face report: {}", source.display()),
+        &format!("{}<table>\n{rows}</table>", figures.grid(3)),
     ))
 }
 
@@ -205,48 +185,4 @@ pub(super) fn opening_text(opening: &OpeningMeasure) -> String {
         "{state}, gap {:.1} mm, {inside}; seam off by median {:.2}  95% {:.2} mm",
         opening.gap_mm, opening.seam.median, opening.seam.p95
     )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
-/// RFC 4648, section 4.
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let at = |k: usize| u32::from(chunk.get(k).copied().unwrap_or(0));
-        let bits = at(0) << 16 | at(1) << 8 | at(2);
-        for k in 0..4 {
-            if k <= chunk.len() {
-                let digit = bits >> (18 - 6 * k) & 63;
-                text.push(char::from(DIGITS[digit as usize]));
-            } else {
-                text.push('=');
-            }
-        }
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_pads_as_the_standard_says() {
-        for (bytes, text) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(bytes.as_bytes()), text);
-        }
-    }
 }

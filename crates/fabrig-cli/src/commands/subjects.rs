@@ -111,7 +111,7 @@ pub(super) fn rig_subjects(console: &Console, rig: Rig, args: &RenderArgs) -> Re
 }
 
 /// Skin and loose parts of a simulated face.
-fn face_layers(simulation: &Simulation) -> Result<Vec<Layer>> {
+pub(super) fn face_layers(simulation: &Simulation) -> Result<Vec<Layer>> {
     let look = FaceLook::default();
     let rig = simulation.rig();
     let skin: Vec<Point> = simulation.skin().iter().map(|p| p.cast()).collect();

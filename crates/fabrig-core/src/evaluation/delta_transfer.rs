@@ -97,7 +97,7 @@ impl DeltaTransfer {
 }
 
 /// Root mean square distance from the middle. (mm)
-fn size(points: &[Point]) -> f64 {
+pub(super) fn size(points: &[Point]) -> f64 {
     let count = points.len() as f64;
     let middle = points.iter().map(|p| p.coords).sum::<Vector>() / count;
     let sum: f64 = points

@@ -8,11 +8,16 @@
 //!
 //! Zhu & Joslin 2024, section 4.2, Table 3.
 
+mod check;
 mod delta_transfer;
 mod faces;
 mod space_map;
 mod table3;
 
+pub use check::{
+    CheckError, CheckGates, CheckReport, Finding, GATES, Gate, MuscleCheck, RegionDistance,
+    RigCheck, ShapeCheck, check_rig,
+};
 pub use faces::{OwnFace, synthetic_faces};
 pub use table3::{
     Drive, FaceResult, METHODS, Method, POSES, Pose, PoseError, Table3, Table3Error, evaluate_face,

@@ -1,6 +1,6 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -104,6 +104,53 @@ class Rig:
     def to_head(self) -> NDArray[np.float64]: ...
     @property
     def report(self) -> dict[str, Any]: ...
+    def check(
+        self,
+        *,
+        gates: Mapping[str, float] | None = None,
+        progress: Progress | None = None,
+    ) -> CheckReport: ...
+
+class ShapeCheck(TypedDict):
+    shape: str
+    over: str | None
+    amplitude_mm: float
+    parts_mm: float
+    template_mm: float
+    ratio: float | None
+    direction: float | None
+    wrong_side: int
+    torn_edges: int
+    leak_mm: float | None
+    flipped: int
+    area_ratios: list[float]
+    lip_crossings: int
+    lip_depth_mm: float
+    lid_crossings: int
+    lid_depth_mm: float
+
+class CheckFinding(TypedDict):
+    gate: str
+    shape: str | None
+    value: float
+    limit: float
+    vertex: int | None
+    text: str
+
+class CheckReport(TypedDict):
+    passes: bool
+    template: str
+    skin_vertices: int
+    size: float
+    gates: dict[str, float]
+    shapes: list[ShapeCheck]
+    muscles: list[dict[str, Any]]
+    distance: dict[str, float]
+    regions: list[dict[str, Any]]
+    findings: list[CheckFinding]
+    notes: list[str]
+    distances: NDArray[np.float64]
+    marked: dict[str, list[int]]
 
 class Clip:
     def __init__(
