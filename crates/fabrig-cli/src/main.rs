@@ -1,7 +1,8 @@
 //! `fabrig`: rigs a face, animates it, records it.
 //!
 //! Results go to standard output, everything else to standard error. Exit codes: 0 done,
-//! 1 failed, 2 wrong usage, 3 finished with less than was asked for (stopped by Ctrl-C).
+//! 1 failed, 2 wrong usage, 3 finished with less than was asked for (stopped by Ctrl-C, a gate that
+//! does not hold).
 
 mod cli;
 mod commands;

@@ -10,6 +10,9 @@ use crate::transfer::{ShapeWeights, TransferError, muscle_shapes};
 
 /// Muscle shapes that move the template by less are not looked at. (mm)
 const TELLING: f64 = 0.5;
+/// A muscle that moves by less than this share of the template's motion stands still: what is
+/// left is rounding, and points anywhere.
+const STILL: f64 = 0.02;
 
 /// Every muscle shape that moves the template by half a millimetre or more.
 ///
@@ -55,7 +58,7 @@ pub(super) fn compare_muscles(
                 name: drawn.name.clone(),
                 template_mm: most,
                 ratio: dot / wanted,
-                direction: if own > 0.0 {
+                direction: if own > STILL * STILL * wanted {
                     dot / (own * wanted).sqrt()
                 } else {
                     0.0
