@@ -100,6 +100,10 @@ pub(crate) struct RigArgs {
     /// Order of points without names [default: by their count]
     #[arg(long, value_enum, value_name = "ORDER", requires = "landmarks")]
     pub(crate) landmarks_order: Option<Order>,
+    /// Folder of a template of your own, as `fabrig template build` makes it [default: the
+    /// bundled one]
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) template: Option<PathBuf>,
     /// Unit of the mesh; without it the face is scaled by the distance of its eyes
     #[arg(long, value_enum)]
     pub(crate) unit: Option<Unit>,
@@ -115,7 +119,7 @@ pub(crate) struct RigArgs {
         long,
         value_enum,
         value_name = "MODE",
-        default_value = "shape",
+        default_value = "own",
         requires = "shapes"
     )]
     pub(crate) alpha: Alpha,
@@ -469,11 +473,31 @@ pub(crate) enum Zoom {
     Eye,
 }
 
+/// A sheet of expressions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExpressionSheet {
+    /// How far a face goes
+    Motion,
+    /// Six emotions, contempt and five mouth shapes of speech
+    Emotions,
+}
+
+impl ExpressionSheet {
+    /// Its name in `expressions.toml`.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Emotions => "emotions",
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
     /// Mesh, rig (.fabrig), recording (.mcap) or folder of a template; `demo` and `template` are
-    /// the bundled ones
-    pub(crate) input: PathBuf,
+    /// the bundled ones; several rigs are drawn row by row
+    #[arg(required = true)]
+    pub(crate) input: Vec<PathBuf>,
     /// PNG, or GIF for a recording
     #[arg(short, long, value_name = "OUT.png")]
     pub(crate) output: PathBuf,
@@ -495,9 +519,10 @@ pub(crate) struct RenderArgs {
     /// Pose of a rig, held until still: SHAPE=WEIGHT,...; each one is a row
     #[arg(long, value_name = "POSE", conflicts_with = "expressions")]
     pub(crate) pose: Vec<String>,
-    /// A sheet of twelve expressions of a rig, closer on the face
-    #[arg(long)]
-    pub(crate) expressions: bool,
+    /// A sheet of twelve expressions of a rig, closer on the face: how far it goes, or emotions
+    /// and speech (templates/human/expressions.toml)
+    #[arg(long, value_enum, value_name = "SHEET", num_args = 0..=1, default_missing_value = "motion")]
+    pub(crate) expressions: Option<ExpressionSheet>,
     /// A sheet of every shape of a rig at weight 1, one tile each
     #[arg(long, conflicts_with_all = ["expressions", "pose"])]
     pub(crate) all_shapes: bool,
@@ -523,25 +548,42 @@ pub(crate) struct InfoArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum TemplateCommand {
-    /// Build `geometry.bin` of a pack from its source data, and fit its skin weights
-    Build {
-        /// The `data` folder of the source
-        data: PathBuf,
-        /// The pack, with its `template.toml`
-        #[arg(default_value = "templates/human")]
-        folder: PathBuf,
-    },
+    /// Build a pack: the bundled one from its source data, or one of your own from a rig that you
+    /// have; its skin weights are fitted
+    Build(TemplateBuildArgs),
     /// Fit the skin weights of a pack and store them in it as `skin_weights.bin`
     Fit {
         /// The pack
         #[arg(default_value = "templates/human")]
         folder: PathBuf,
     },
-    /// Load a pack with everything that is read from it
+    /// Load a pack with everything that is read from it, and check its own shapes on it
     Check {
         /// The pack; the bundled one without it
         folder: Option<PathBuf>,
+        /// Also draw it: skin, muscles and twelve expressions
+        #[arg(long, value_name = "OUT.png")]
+        picture: Option<PathBuf>,
     },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TemplateBuildArgs {
+    /// The `data` folder of the bundled template's source; or your own rig: a folder with a neutral
+    /// mesh and meshes named as ARKit's shapes (ICT-FaceKit's layout too), or a glTF file with
+    /// morph targets
+    pub(crate) source: PathBuf,
+    /// The pack [default: templates/human for the bundled template's source]
+    pub(crate) folder: Option<PathBuf>,
+    /// Name of the template [default: the folder's]
+    #[arg(long)]
+    pub(crate) name: Option<String>,
+    /// Whose work your rig is, and under which licence
+    #[arg(long, default_value = "")]
+    pub(crate) credit: String,
+    /// Landmarks of the neutral mesh, as `fabrig rig` takes them
+    #[arg(long, value_name = "FILE")]
+    pub(crate) landmarks: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -578,6 +620,9 @@ pub(crate) struct BenchTable3Args {
     /// Only bundled faces whose name has this in it
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub(crate) filter: String,
+    /// Also write one page with pictures: every pose of every face, coloured by its error
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: Option<PathBuf>,
     /// Print as JSON
     #[arg(long)]
     pub(crate) json: bool,

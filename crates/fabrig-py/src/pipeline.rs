@@ -19,6 +19,7 @@ use crate::motion::PyClip;
 use crate::progress::Progress;
 use crate::rig::PyRig;
 use crate::simulation::scene;
+use crate::template::template_of;
 
 /// Makes the rig of a neutral face.
 ///
@@ -32,11 +33,12 @@ use crate::simulation::scene;
 ///   "map", or their "own" shapes as they are
 /// - `offsets`: how the template's displacements are put on the face, "global", "frame" or
 ///   "transfer" (deformation transfer)
+/// - `template`: folder of a template of your own, as `fabrig template build` makes it
 /// - `progress`: called with (stage, share)
 #[pyfunction]
 #[pyo3(signature = (
     vertices, faces, *, landmarks=None, unit_mm=None, cut_seams=None, expressions=None,
-    alpha="own", offsets="global", progress=None
+    alpha="own", offsets="global", template=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
@@ -49,6 +51,7 @@ pub(crate) fn rig(
     expressions: Option<BTreeMap<String, Bound<'_, PyAny>>>,
     alpha: &str,
     offsets: &str,
+    template: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
     let positions = arrays::points("vertices", vertices)?;
@@ -77,9 +80,10 @@ pub(crate) fn rig(
     for (name, vertices) in expressions.unwrap_or_default() {
         options.expressions.push(expression(name, &vertices)?);
     }
+    let template = template_of(template)?;
     let mut progress = Progress::new(progress);
     let rigged = py.detach(|| {
-        rig_face(&face, template::human(), &options, &mut |step| {
+        rig_face(&face, &template, &options, &mut |step| {
             progress.report(step.stage, step.fraction)
         })
     });

@@ -1,11 +1,22 @@
 //! The bundled template.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
-use fabrig_core::template;
+use fabrig_core::template::{self, Template};
 use pyo3::prelude::*;
 
+use crate::errors::to_py;
 use crate::mesh::PyMesh;
+
+/// The template in a folder, or the bundled one.
+pub(crate) fn template_of(folder: Option<PathBuf>) -> PyResult<Cow<'static, Template>> {
+    Ok(match folder {
+        Some(folder) => Cow::Owned(Template::load(&folder).map_err(to_py)?),
+        None => Cow::Borrowed(template::human()),
+    })
+}
 
 /// The template whose topology every normalized face has.
 #[pyclass(frozen, name = "Template", module = "fabrig")]

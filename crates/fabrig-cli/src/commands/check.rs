@@ -15,7 +15,7 @@ use fabrig_core::template::Template;
 use serde_json::json;
 
 use super::animate::load_rig;
-use super::html::{Figures, escape, page_of, write_page};
+use super::html::{Figures, escape, page_of, table, write_page};
 use super::subjects::face_layers;
 use super::zoom::focus;
 use super::{Outcome, check_output, template_of};
@@ -262,28 +262,6 @@ fn page(
         |_| false,
     );
     Ok(page_of(&format!("Rig check: {}", source.display()), &body))
-}
-
-/// A table, or nothing where it has no rows; `is_bad` rows stand out.
-fn table<const N: usize>(
-    heads: &[&str; N],
-    rows: impl Iterator<Item = [String; N]>,
-    is_bad: impl Fn(&[String; N]) -> bool,
-) -> String {
-    let mut lines = String::new();
-    for row in rows {
-        let class = if is_bad(&row) { " class=\"bad\"" } else { "" };
-        let cells: Vec<String> = row
-            .iter()
-            .map(|cell| format!("<td>{}</td>", escape(cell)))
-            .collect();
-        let _ = writeln!(lines, "<tr{class}>{}</tr>", cells.concat());
-    }
-    if lines.is_empty() {
-        return lines;
-    }
-    let heads = heads.map(|head| format!("<th>{}</th>", escape(head)));
-    format!("<table>\n<tr>{}</tr>\n{lines}</table>\n", heads.concat())
 }
 
 /// The mesh at rest, coloured by how far it is from the registered template.

@@ -20,7 +20,7 @@ td.n,th.n{text-align:right}th{white-space:nowrap;font-weight:600}.wide{overflow-
 /// A whole page.
 ///
 /// - `body`: HTML
-pub(super) fn page_of(title: &str, body: &str) -> String {
+pub(in crate::commands) fn page_of(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\n\
          <style>{STYLE}</style></head>\n<body><h1>{title}</h1>\n{body}</body></html>\n",
@@ -29,19 +29,19 @@ pub(super) fn page_of(title: &str, body: &str) -> String {
 }
 
 /// Writes a page, whole or not at all.
-pub(super) fn write_page(path: &Path, page: &str) -> Result<()> {
+pub(in crate::commands) fn write_page(path: &Path, page: &str) -> Result<()> {
     write_atomically(path, |out| out.write_all(page.as_bytes()))
         .with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Pictures with captions.
-pub(super) struct Figures {
+pub(in crate::commands) struct Figures {
     folder: TempDir,
     html: String,
 }
 
 impl Figures {
-    pub(super) fn new() -> Result<Self> {
+    pub(in crate::commands) fn new() -> Result<Self> {
         Ok(Self {
             folder: tempfile::tempdir().context("cannot make a temporary folder")?,
             html: String::new(),
@@ -49,12 +49,17 @@ impl Figures {
     }
 
     /// Adds a picture.
-    pub(super) fn push(&mut self, image: &Image, caption: &str) -> Result<()> {
+    pub(in crate::commands) fn push(&mut self, image: &Image, caption: &str) -> Result<()> {
         self.push_as(image, caption, "")
     }
 
     /// Adds a picture with a caption of some class.
-    pub(super) fn push_as(&mut self, image: &Image, caption: &str, class: &str) -> Result<()> {
+    pub(in crate::commands) fn push_as(
+        &mut self,
+        image: &Image,
+        caption: &str,
+        class: &str,
+    ) -> Result<()> {
         let file = self.folder.path().join("picture.png");
         image.save_png(&file)?;
         let bytes = std::fs::read(&file).context("cannot read a picture back")?;
@@ -70,7 +75,7 @@ impl Figures {
     }
 
     /// All of them, so many in a row.
-    pub(super) fn grid(&self, columns: usize) -> String {
+    pub(in crate::commands) fn grid(&self, columns: usize) -> String {
         format!(
             "<div class=\"pictures\" style=\"grid-template-columns:repeat({columns},1fr)\">\n{}\
              </div>\n",
@@ -79,8 +84,30 @@ impl Figures {
     }
 }
 
+/// A table, or nothing where it has no rows; `is_bad` rows stand out.
+pub(in crate::commands) fn table<const N: usize>(
+    heads: &[&str; N],
+    rows: impl Iterator<Item = [String; N]>,
+    is_bad: impl Fn(&[String; N]) -> bool,
+) -> String {
+    let mut lines = String::new();
+    for row in rows {
+        let class = if is_bad(&row) { " class=\"bad\"" } else { "" };
+        let cells: Vec<String> = row
+            .iter()
+            .map(|cell| format!("<td>{}</td>", escape(cell)))
+            .collect();
+        let _ = writeln!(lines, "<tr{class}>{}</tr>", cells.concat());
+    }
+    if lines.is_empty() {
+        return lines;
+    }
+    let heads = heads.map(|head| format!("<th>{}</th>", escape(head)));
+    format!("<table>\n<tr>{}</tr>\n{lines}</table>\n", heads.concat())
+}
+
 /// Text as HTML.
-pub(super) fn escape(text: &str) -> String {
+pub(in crate::commands) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

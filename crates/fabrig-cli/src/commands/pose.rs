@@ -1,29 +1,20 @@
 //! Poses as text: `jawOpen=0.5,mouthSmile=1`.
 
 use anyhow::{Result, anyhow, ensure};
-use fabrig_core::facs::{ShapeMatch, match_shape, nearest_name};
+use fabrig_core::facs::{ShapeMatch, match_shape, named_expressions, nearest_name};
 
-/// The expressions of the sheet that `fabrig render --expressions` draws.
-pub(super) const EXPRESSIONS: [(&str, &str); 12] = [
-    ("smile", "mouthSmile=1,cheekSquint=0.7,eyeSquint=0.3"),
-    ("jaw open", "jawOpen=1"),
-    ("blink", "eyeBlink=1"),
-    ("brows up", "browInnerUp=1,browOuterUp=1,eyeWide=0.6"),
-    ("brows down", "browDown=1,eyeSquint=0.5,mouthPress=0.4"),
-    ("sneer", "noseSneer=1,mouthUpperUp=0.7,browDown=0.4"),
-    ("pucker", "mouthPucker=1"),
-    ("funnel", "mouthFunnel=1,jawOpen=0.2"),
-    ("frown", "mouthFrown=1,mouthShrugLower=0.5,browInnerUp=0.5"),
-    ("puff", "cheekPuff=1"),
-    (
-        "disgust",
-        "noseSneerLeft=1,mouthUpperUpLeft=0.8,eyeSquintLeft=0.6,browDown=0.5,mouthFrown=0.4",
-    ),
-    (
-        "grimace",
-        "mouthStretch=1,mouthLowerDown=0.8,jawOpen=0.15,browInnerUp=0.6",
-    ),
-];
+/// The expressions of a sheet of the template's, as names and weights in the order of `shapes`.
+pub(super) fn expression_sheet(sheet: &str, shapes: &[String]) -> Result<Vec<(String, Vec<f32>)>> {
+    let of_sheet = named_expressions().iter().filter(|e| e.sheet == sheet);
+    of_sheet
+        .map(|expression| {
+            let weights = expression.weights.iter();
+            let items: Vec<String> = weights.map(|(name, w)| format!("{name}={w}")).collect();
+            let pose = parse_pose(&items.join(","), shapes)?;
+            Ok((expression.name.clone(), pose))
+        })
+        .collect()
+}
 
 /// Weights in the order of `shapes`; names in any spelling, without a side for both.
 pub(super) fn parse_pose(text: &str, shapes: &[String]) -> Result<Vec<f32>> {
@@ -66,9 +57,12 @@ mod tests {
     #[test]
     fn poses_name_shapes_in_any_spelling() {
         let shapes = ARKIT_SHAPES.map(str::to_owned);
-        for (name, text) in EXPRESSIONS {
-            let weights = parse_pose(text, &shapes).unwrap();
-            assert!(weights.iter().any(|&w| w > 0.5), "{name}");
+        for sheet in ["motion", "emotions"] {
+            let poses = expression_sheet(sheet, &shapes).unwrap();
+            assert_eq!(poses.len(), 12);
+            for (name, weights) in poses {
+                assert!(weights.iter().any(|&w| w >= 0.5), "{name}");
+            }
         }
         let weights = parse_pose("JAW_OPEN=0.25, eyeBlink=1", &shapes).unwrap();
         assert_eq!(weights.iter().sum::<f32>(), 2.25);

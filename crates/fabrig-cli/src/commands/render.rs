@@ -30,41 +30,38 @@ pub(crate) fn run(console: &Console, args: &RenderArgs) -> Result<Outcome> {
         .collect::<Result<_>>()?;
     let extension = |path: &Path| path.extension().map(|e| e.to_ascii_lowercase());
     let is_gif = extension(&args.output).is_some_and(|e| e == "gif");
-    let name = args.input.to_string_lossy();
+    let [input] = args.input.as_slice() else {
+        return render_rigs(console, args, &views);
+    };
+    let name = input.to_string_lossy();
     let look = FaceLook::default();
     match (
         name.as_ref(),
-        extension(&args.input).as_deref().and_then(|e| e.to_str()),
+        extension(input).as_deref().and_then(|e| e.to_str()),
     ) {
-        (_, Some("mcap")) => render_recording(console, args, &views, is_gif),
+        (_, Some("mcap")) => render_recording(console, args, input, &views, is_gif),
         _ if is_gif => bail!(
             "{}: a GIF is made from a recording (.mcap)",
             args.output.display()
         ),
-        ("demo", _) => {
-            let rigged = rig::rig(console, &template::demo_face(), &RigFaceOptions::default())?;
-            render_rig(console, args, &views, rigged.rig)
-        }
-        (_, Some("fabrig")) => {
-            let rig = load_rig(&args.input)?;
+        ("demo", _) | (_, Some("fabrig")) => {
+            let rig = rig_of(console, input)?;
             render_rig(console, args, &views, rig)
         }
         ("template", _) => render_template(console, args, &views, template::human()),
-        _ if args.input.is_dir() => {
-            render_template(console, args, &views, &Template::load(&args.input)?)
-        }
+        _ if input.is_dir() => render_template(console, args, &views, &Template::load(input)?),
         _ => {
             ensure!(
                 args.pose.is_empty()
-                    && !args.expressions
+                    && args.expressions.is_none()
                     && !args.all_shapes
                     && !args.patches
                     && args.zoom.is_none(),
                 "{}: only a rig has poses, patches and parts to zoom in on; make one with \
                  `fabrig rig`",
-                args.input.display()
+                input.display()
             );
-            let layers = mesh_layers(&read_mesh(&args.input)?, &look)?;
+            let layers = mesh_layers(&read_mesh(input)?, &look)?;
             compose(
                 console,
                 args,
@@ -94,22 +91,37 @@ fn render_template(
 
 /// Sheets of faces show the face, a single picture the whole head.
 fn default_zoom(args: &RenderArgs) -> Zoom {
-    if (args.expressions || args.all_shapes) && !args.patches {
+    if (args.expressions.is_some() || args.all_shapes) && !args.patches {
         Zoom::Face
     } else {
         Zoom::All
     }
 }
 
-fn render_rig(console: &Console, args: &RenderArgs, views: &[View], rig: Rig) -> Result<Outcome> {
+/// A rig from its file, or that of the bundled face.
+fn rig_of(console: &Console, input: &Path) -> Result<Rig> {
+    if input.as_os_str() == "demo" {
+        let options = RigFaceOptions::default();
+        Ok(rig::rig(console, &template::demo_face(), &options)?.rig)
+    } else {
+        load_rig(input)
+    }
+}
+
+/// What pictures of a rig hold; nothing for all of it.
+fn rig_focus(rig: &Rig, args: &RenderArgs) -> Result<Vec<Point>> {
     let zoom = args.zoom.unwrap_or(default_zoom(args));
-    let template = template::human();
-    let focus = focus(zoom, template, &rig.positions, &rig.jaw.hinge);
+    let focus = focus(zoom, template::human(), &rig.positions, &rig.jaw.hinge);
     ensure!(
         zoom == Zoom::All || !focus.is_empty(),
         "the rig was made with another template ({}): it cannot be zoomed in on",
         rig.template
     );
+    Ok(focus)
+}
+
+fn render_rig(console: &Console, args: &RenderArgs, views: &[View], rig: Rig) -> Result<Outcome> {
+    let focus = rig_focus(&rig, args)?;
     compose(
         console,
         args,
@@ -119,14 +131,60 @@ fn render_rig(console: &Console, args: &RenderArgs, views: &[View], rig: Rig) ->
     )
 }
 
-/// One picture per subject and view, in a grid, to a PNG. Pictures hold the points of `focus`,
-/// or all of the first subject where there are none.
+/// Several rigs in the same poses, one a row, each framed by itself.
+fn render_rigs(console: &Console, args: &RenderArgs, views: &[View]) -> Result<Outcome> {
+    ensure!(
+        views.len() == 1,
+        "several rigs are drawn from one view; give one `--view`"
+    );
+    let mut subjects = Vec::new();
+    let mut columns = 1;
+    for input in &args.input {
+        ensure!(
+            input.as_os_str() == "demo" || input.extension().is_some_and(|e| e == "fabrig"),
+            "{}: only rigs (.fabrig, or `demo`) are drawn side by side",
+            input.display()
+        );
+        let name = super::stem(input);
+        let rig = rig_of(console, input)?;
+        let mut held = rig_focus(&rig, args)?;
+        let own = rig_subjects(console, rig, args)?;
+        columns = own.len().max(1);
+        for mut subject in own {
+            if held.is_empty() {
+                held = points(&subject.layers);
+            }
+            subject.caption = match subject.caption.as_str() {
+                "" => name.clone(),
+                pose => format!("{name}: {pose}"),
+            };
+            subject.focus.clone_from(&held);
+            subjects.push(subject);
+        }
+    }
+    compose_in(console, args, views, subjects, Vec::new(), Some(columns))
+}
+
+/// As [`compose_in`], in a grid that is about square.
 fn compose(
     console: &Console,
     args: &RenderArgs,
     views: &[View],
     subjects: Vec<Subject>,
+    focus: Vec<Point>,
+) -> Result<Outcome> {
+    compose_in(console, args, views, subjects, focus, None)
+}
+
+/// One picture per subject and view, in a grid, to a PNG. Pictures hold the points of `focus`,
+/// or all of the first subject where there are none, unless a subject says otherwise.
+fn compose_in(
+    console: &Console,
+    args: &RenderArgs,
+    views: &[View],
+    subjects: Vec<Subject>,
     mut focus: Vec<Point>,
+    columns: Option<usize>,
 ) -> Result<Outcome> {
     // Every picture is framed as the first, so that poses can be compared.
     if focus.is_empty()
@@ -134,11 +192,11 @@ fn compose(
     {
         focus = points(&first.layers);
     }
-    let columns = if views.len() > 1 || subjects.len() < 4 {
+    let columns = columns.unwrap_or(if views.len() > 1 || subjects.len() < 4 {
         views.len().max(1)
     } else {
         (subjects.len() as f64).sqrt().ceil() as usize
-    };
+    });
     let mut sheet = Sheet::new();
     let total = (subjects.len() * views.len()) as u64;
     let mut done = 0;
@@ -149,7 +207,12 @@ fn compose(
                 (caption, 1) => caption.to_owned(),
                 (caption, _) => format!("{caption}, {name}"),
             };
-            sheet.push(picture(args, *view, &subject, &focus)?, caption);
+            let held = if subject.focus.is_empty() {
+                &focus
+            } else {
+                &subject.focus
+            };
+            sheet.push(picture(args, *view, &subject, held)?, caption);
             done += 1;
             if console.show("render", done, total, "").is_break() {
                 bail!("stopped; nothing was written");
@@ -198,6 +261,7 @@ fn picture(args: &RenderArgs, view: View, subject: &Subject, focus: &[Point]) ->
 fn render_recording(
     console: &Console,
     args: &RenderArgs,
+    input: &Path,
     views: &[View],
     is_gif: bool,
 ) -> Result<Outcome> {
@@ -212,7 +276,7 @@ fn render_recording(
         RecordingContent::Face
     };
     let look = FaceLook::default();
-    let mut reader = RecordingReader::open(&args.input)?;
+    let mut reader = RecordingReader::open(input)?;
     let wanted = args.time.unwrap_or(0.0);
     let mut first = None;
     let mut focus = Vec::new();
@@ -263,7 +327,7 @@ fn render_recording(
             Outcome::Done
         });
     }
-    let subject = last_subject
-        .with_context(|| format!("{} has no frame with a mesh", args.input.display()))?;
+    let subject =
+        last_subject.with_context(|| format!("{} has no frame with a mesh", input.display()))?;
     compose(console, args, views, vec![subject], Vec::new())
 }

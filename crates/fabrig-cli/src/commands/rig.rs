@@ -5,9 +5,9 @@ use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::{read_mesh, write_obj};
 use fabrig_core::pipeline::{OwnShapes, RigFaceOptions, RiggedFace, read_own_shapes, rig_face};
 use fabrig_core::registration::{CutSeams, DistanceStatistics, LandmarkOrder, read_landmarks};
-use fabrig_core::template;
+use fabrig_core::template::{Template, human};
 
-use super::{Outcome, check_output, report};
+use super::{Outcome, check_output, report, template_of};
 use crate::cli::{Order, RigArgs, Seam};
 use crate::console::Console;
 
@@ -33,18 +33,20 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         eyes: args.cut_seams.contains(&Seam::Eyes),
     };
     let face = read_mesh(&args.face)?;
+    let template = template_of(args.template.as_deref())?;
     if let Some(offsets) = args.offsets {
         options.rig.offsets = offsets.into();
     }
     options.rig.alpha = args.alpha.into();
     let own = match &args.shapes {
-        Some(source) => Some(read_own_shapes(source, &face, template::human())?),
+        Some(source) => Some(read_own_shapes(source, &face, &template)?),
         None => None,
     };
     if let Some(own) = &own {
         options.expressions.clone_from(&own.expressions);
+        options.expressions_on.clone_from(&own.neutral);
     }
-    let rigged = rig(console, &face, &options)
+    let rigged = rig_on(console, &face, &template, &options)
         .with_context(|| format!("{} was not rigged", args.face.display()))?;
     rigged.rig.save(&args.output)?;
     if let Some(path) = &args.normalized {
@@ -61,7 +63,7 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
     } else {
         print_report(console, &rigged);
         if let Some(own) = &own {
-            print_own_shapes(console, own, &rigged);
+            print_own_shapes(console, own, &template, &rigged);
         }
         console.result(&format!("{:<20}{}", "rig", args.output.display()));
     }
@@ -70,7 +72,17 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
 
 /// Rigs with the bundled template and a progress bar.
 pub(super) fn rig(console: &Console, face: &Mesh, options: &RigFaceOptions) -> Result<RiggedFace> {
-    let rigged = rig_face(face, template::human(), options, &mut |step| {
+    rig_on(console, face, human(), options)
+}
+
+/// Rigs with a template and a progress bar.
+fn rig_on(
+    console: &Console,
+    face: &Mesh,
+    template: &Template,
+    options: &RigFaceOptions,
+) -> Result<RiggedFace> {
+    let rigged = rig_face(face, template, options, &mut |step| {
         console.share(step.stage, step.fraction)
     });
     console.clear();
@@ -78,7 +90,7 @@ pub(super) fn rig(console: &Console, face: &Mesh, options: &RigFaceOptions) -> R
 }
 
 /// What the face's own expressions were good for.
-fn print_own_shapes(console: &Console, own: &OwnShapes, rigged: &RiggedFace) {
+fn print_own_shapes(console: &Console, own: &OwnShapes, template: &Template, rigged: &RiggedFace) {
     let mut alphas: Vec<f64> = rigged
         .rig
         .patches
@@ -86,7 +98,7 @@ fn print_own_shapes(console: &Console, own: &OwnShapes, rigged: &RiggedFace) {
         .map(|patch| patch.transfer.alpha)
         .collect();
     alphas.sort_by(f64::total_cmp);
-    let open = rigged.rig.jaw.hinge.open_angle / template::human().jaw.open_angle;
+    let open = rigged.rig.jaw.hinge.open_angle / template.jaw.open_angle;
     console.result(&format!(
         "{:<20}{}, amplitudes of the patches {:.2} to {:.2}, median {:.2}; the jaw opens {:.2} times \
          as far",

@@ -10,7 +10,7 @@ use fabrig_core::rig::Rig;
 use fabrig_core::scene::{FacePose, Scene, Simulation, hold_pose};
 use fabrig_core::template::Template;
 
-use super::pose::{EXPRESSIONS, parse_pose};
+use super::pose::{expression_sheet, parse_pose};
 use crate::cli::RenderArgs;
 use crate::console::Console;
 
@@ -19,6 +19,8 @@ pub(super) struct Subject {
     pub(super) caption: String,
     pub(super) layers: Vec<Layer>,
     pub(super) labels: Vec<Label>,
+    /// What its picture holds, where that is not what the others hold. (mm)
+    pub(super) focus: Vec<Point>,
 }
 
 impl Subject {
@@ -27,6 +29,7 @@ impl Subject {
             caption: caption.to_owned(),
             layers,
             labels: Vec::new(),
+            focus: Vec::new(),
         }
     }
 }
@@ -34,11 +37,8 @@ impl Subject {
 /// The poses asked for by name, or the neutral face.
 fn poses(shapes: &[String], args: &RenderArgs) -> Result<Vec<(String, Vec<f32>)>> {
     let parse = |text: &str| parse_pose(text, shapes);
-    if args.expressions {
-        let named = EXPRESSIONS.iter();
-        named
-            .map(|(name, text)| Ok(((*name).to_owned(), parse(text)?)))
-            .collect()
+    if let Some(sheet) = args.expressions {
+        expression_sheet(sheet.name(), shapes)
     } else if args.all_shapes {
         Ok((0..shapes.len())
             .map(|shape| {
@@ -99,6 +99,7 @@ pub(super) fn rig_subjects(console: &Console, rig: Rig, args: &RenderArgs) -> Re
             caption,
             layers,
             labels,
+            focus: Vec::new(),
         });
         if console
             .show("settle", index as u64 + 1, count, "")

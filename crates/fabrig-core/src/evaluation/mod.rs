@@ -11,6 +11,7 @@
 mod check;
 mod delta_transfer;
 mod faces;
+mod methods;
 mod space_map;
 mod table3;
 
@@ -19,6 +20,5 @@ pub use check::{
     RigCheck, ShapeCheck, check_rig,
 };
 pub use faces::{OwnFace, synthetic_faces};
-pub use table3::{
-    Drive, FaceResult, METHODS, Method, POSES, Pose, PoseError, Table3, Table3Error, evaluate_face,
-};
+pub use methods::{Drive, METHODS, Method, POSES, Pose};
+pub use table3::{FaceResult, PoseError, RegionError, Table3, Table3Error, evaluate_face};

@@ -3,10 +3,12 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use nalgebra::Similarity3;
 use serde::Serialize;
 
 use super::delta_transfer::DeltaTransfer;
 use super::faces::OwnFace;
+use super::methods::{Drive, Method, POSES, Pose};
 use crate::registration::{Registration, RegistrationError, RegistrationOptions, register};
 use crate::retarget::{
     Controls, FitFrame, FitOptions, ResponseModel, RetargetError, fit_clip, mesh_sites,
@@ -14,98 +16,8 @@ use crate::retarget::{
 use crate::rig::{FaceOnTemplate, Rig, RigError, RigOptions, build, carry_expressions};
 use crate::scene::{FacePose, Scene, SceneError, Simulation};
 use crate::template::Template;
-use crate::transfer::{AlphaMode, Example, OffsetMode};
+use crate::transfer::{AlphaMode, Example};
 use crate::{Point, Vector};
-
-/// A pose of the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Pose {
-    /// Name, as in the paper.
-    pub name: &'static str,
-    /// Shapes at weight 1.
-    pub shapes: &'static [&'static str],
-}
-
-/// The four poses of the paper.
-pub const POSES: [Pose; 4] = [
-    Pose {
-        name: "mouth corners up",
-        shapes: &["mouthSmileLeft", "mouthSmileRight"],
-    },
-    Pose {
-        name: "eyebrows down",
-        shapes: &["browDownLeft", "browDownRight"],
-    },
-    Pose {
-        name: "mouth open",
-        shapes: &["jawOpen"],
-    },
-    Pose {
-        name: "sneer",
-        shapes: &["noseSneerLeft", "noseSneerRight"],
-    },
-];
-
-/// How expressions are put on a face.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Method {
-    /// Name in tables.
-    pub name: &'static str,
-    /// How the rig does it; `None` for delta transfer.
-    pub offsets: Option<OffsetMode>,
-    /// What examples are fitted by.
-    pub alpha: AlphaMode,
-    /// Whether the shapes of the poses are among the examples.
-    pub sees_poses: bool,
-}
-
-const fn method(
-    name: &'static str,
-    offsets: Option<OffsetMode>,
-    alpha: AlphaMode,
-    sees_poses: bool,
-) -> Method {
-    Method {
-        name,
-        offsets,
-        alpha,
-        sees_poses,
-    }
-}
-
-/// Everything that is compared. The first is the yardstick; examples are the face's other
-/// shapes, or all of them where a method `sees_poses`.
-pub const METHODS: [Method; 13] = {
-    use AlphaMode::{Map, Own, Patch, PatchAndShape, Size};
-    const GLOBAL: Option<OffsetMode> = Some(OffsetMode::Global);
-    const FRAME: Option<OffsetMode> = Some(OffsetMode::Frame);
-    const TRANSFER: Option<OffsetMode> = Some(OffsetMode::DeformationTransfer);
-    [
-        method("delta", None, Size, false),
-        method("delta, fitted size", None, Patch, false),
-        method("global, size", GLOBAL, Size, false),
-        method("global, patch", GLOBAL, Patch, false),
-        method("global, patch, all", GLOBAL, Patch, true),
-        method("global, shape, all", GLOBAL, PatchAndShape, true),
-        method("global, map", GLOBAL, Map, false),
-        method("global, map, all", GLOBAL, Map, true),
-        method("own shapes", GLOBAL, Own, true),
-        method("frame, size", FRAME, Size, false),
-        method("frame, map", FRAME, Map, false),
-        method("transfer, size", TRANSFER, Size, false),
-        method("transfer, map", TRANSFER, Map, false),
-    ]
-};
-
-/// Where the weights of a pose come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Drive {
-    /// The pose's own shapes at weight 1, as action units give them.
-    Units,
-    /// Fitted to the pose.
-    BestFit,
-}
 
 /// Distances of a posed mesh from the face's own, over the vertices that the pose moves.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -126,6 +38,28 @@ pub struct PoseError {
     pub deviation: f64,
     /// (mm)
     pub max: f64,
+    /// How far the motion falls short of the face's own, along it, in the mean; negative where it
+    /// goes too far. (mm)
+    pub short: f64,
+    /// How far it goes beside the face's own, in the mean. (mm)
+    pub beside: f64,
+    /// Mean distances by region of the template, in its order.
+    pub regions: Vec<RegionError>,
+    /// Distance of every vertex, not a number for those that the pose leaves still; empty for a
+    /// best fit. (mm)
+    #[serde(skip)]
+    pub distances: Vec<f32>,
+}
+
+/// Distances in one region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegionError {
+    /// Name of the region.
+    pub region: String,
+    /// Vertices.
+    pub count: usize,
+    /// Mean distance. (mm)
+    pub mean: f64,
 }
 
 /// A face's errors.
@@ -141,6 +75,9 @@ pub struct FaceResult {
     pub registration_median: f64,
     /// Every pose by every method.
     pub errors: Vec<PoseError>,
+    /// From the units of its mesh to the head frame.
+    #[serde(skip)]
+    pub to_head: Similarity3<f64>,
 }
 
 /// The table.
@@ -244,6 +181,7 @@ pub fn evaluate_face(
         vertex_count: face.neutral.vertex_count(),
         registration_median: registration.report.template_to_face.median,
         errors,
+        to_head: registration.to_head,
     })
 }
 
@@ -260,6 +198,8 @@ struct OwnPose {
     displacements: Vec<Vector>,
     /// Vertices of the skin that move.
     moved: Vec<usize>,
+    /// The same by region.
+    regions: Vec<(String, Vec<usize>)>,
 }
 
 fn own_poses(face: &OwnFace, template: &Template, registration: &Registration) -> Vec<OwnPose> {
@@ -286,14 +226,22 @@ fn own_poses(face: &OwnFace, template: &Template, registration: &Registration) -
         if !is_whole {
             continue;
         }
-        let moved = (0..displacements.len())
+        let moved: Vec<usize> = (0..displacements.len())
             .filter(|&v| !is_part[v] && displacements[v].norm() >= MOVED)
             .collect();
+        let regions = template.regions.regions.iter().enumerate();
+        let by_region = regions.map(|(r, region)| {
+            let is_of = |v: &&usize| registration.face_regions[**v].0 as usize == r;
+            let vertices: Vec<usize> = moved.iter().filter(is_of).copied().collect();
+            (region.name.clone(), vertices)
+        });
+        let regions = by_region.filter(|(_, of)| !of.is_empty()).collect();
         poses.push(OwnPose {
             pose,
             weights,
             displacements,
             moved,
+            regions,
         });
     }
     poses
@@ -393,21 +341,43 @@ fn by_rig(
 }
 
 fn compare(own: &OwnPose, method: &Method, drive: Drive, posed: &[Vector]) -> PoseError {
-    let count = own.moved.len();
-    let over = |of: &dyn Fn(usize) -> f64| -> f64 {
-        own.moved.iter().map(|&v| of(v)).sum::<f64>() / count.max(1) as f64
+    let over = |vertices: &[usize], of: &dyn Fn(usize) -> f64| -> f64 {
+        vertices.iter().map(|&v| of(v)).sum::<f64>() / vertices.len().max(1) as f64
     };
     let distance = |v: usize| (posed[v] - own.displacements[v]).norm();
-    let mean = over(&distance);
+    // Every vertex that takes part moves, so its motion has a direction.
+    let along = |v: usize| posed[v].dot(&own.displacements[v].normalize());
+    let mean = over(&own.moved, &distance);
+    let mut distances = Vec::new();
+    if drive == Drive::Units {
+        distances.resize(posed.len(), f32::NAN);
+        own.moved
+            .iter()
+            .for_each(|&v| distances[v] = distance(v) as f32);
+    }
     PoseError {
         method: method.name,
         pose: own.pose.name,
         drive,
-        count,
-        motion: over(&|v| own.displacements[v].norm()),
+        count: own.moved.len(),
+        motion: over(&own.moved, &|v| own.displacements[v].norm()),
         mean,
-        deviation: over(&|v| (distance(v) - mean).powi(2)).sqrt(),
+        deviation: over(&own.moved, &|v| (distance(v) - mean).powi(2)).sqrt(),
         max: own.moved.iter().map(|&v| distance(v)).fold(0.0, f64::max),
+        short: over(&own.moved, &|v| own.displacements[v].norm() - along(v)),
+        beside: over(&own.moved, &|v| {
+            (posed[v].norm_squared() - along(v).powi(2)).max(0.0).sqrt()
+        }),
+        regions: own
+            .regions
+            .iter()
+            .map(|(region, vertices)| RegionError {
+                region: region.clone(),
+                count: vertices.len(),
+                mean: over(vertices, &distance),
+            })
+            .collect(),
+        distances,
     }
 }
 
@@ -421,6 +391,31 @@ impl FaceResult {
             .filter(|e| e.method == method && e.drive == drive && pose.is_none_or(|p| p == e.pose));
         let means: Vec<f64> = errors.map(|e| e.mean).collect();
         (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
+    }
+
+    /// A pose by a method.
+    pub fn error(&self, method: &str, pose: &str, drive: Drive) -> Option<&PoseError> {
+        let mut errors = self.errors.iter();
+        errors.find(|e| e.method == method && e.pose == pose && e.drive == drive)
+    }
+
+    /// Where a method is further from the face's own pose than another: regions, with what each
+    /// adds to the difference of the means, largest first. (mm)
+    pub fn losses(&self, method: &str, other: &str, pose: &str) -> Vec<(String, f64)> {
+        let of = |method| self.error(method, pose, Drive::Units);
+        let (Some(own), Some(other)) = (of(method), of(other)) else {
+            return Vec::new();
+        };
+        let pairs = own.regions.iter().zip(&other.regions);
+        let mut losses: Vec<(String, f64)> = pairs
+            .map(|(a, b)| {
+                let share = a.count as f64 / own.count.max(1) as f64;
+                (a.region.clone(), share * (a.mean - b.mean))
+            })
+            .filter(|(_, loss)| *loss > 0.0)
+            .collect();
+        losses.sort_by(|a, b| b.1.total_cmp(&a.1));
+        losses
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod action_unit;
 mod arkit;
+mod expressions;
 mod unit_map;
 mod unit_name;
 
@@ -14,5 +15,6 @@ pub use action_unit::{ActionUnit, ActionUnitTable, Corrective, FacsError};
 pub use arkit::{
     ARKIT_SHAPES, JAW_OPEN, MOUTH_CLOSE, ShapeMatch, match_shape, mirrored_shape, nearest_name,
 };
+pub use expressions::{NamedExpression, named_expressions};
 pub use unit_map::{ActionUnitMap, UnitIntensity};
 pub use unit_name::{Side, UnitName, match_unit};

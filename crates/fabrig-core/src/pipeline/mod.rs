@@ -23,6 +23,7 @@ mod animate;
 mod contact;
 mod cost;
 mod own_shapes;
+mod own_template;
 mod rig_face;
 mod strain;
 mod timing;
@@ -31,5 +32,6 @@ pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recor
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
+pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use timing::TimeStatistics;

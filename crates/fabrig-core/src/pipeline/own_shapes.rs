@@ -1,11 +1,12 @@
 //! A face's own expressions, named as ARKit names them: a folder with one mesh a shape, or a
 //! glTF file whose morph targets they are.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::facs::match_shape;
+use crate::facs::{ARKIT_SHAPES, ShapeMatch, match_shape};
 use crate::mesh::Mesh;
-use crate::mesh::io::{MeshIoError, read_mesh, read_mesh_with_shapes};
+use crate::mesh::io::{MeshIoError, MeshShape, read_mesh, read_mesh_with_shapes};
 use crate::rig::Expression;
 use crate::template::Template;
 
@@ -16,6 +17,9 @@ pub struct OwnShapes {
     pub expressions: Vec<Expression>,
     /// Meshes and morph targets (`face.glb#hat`) that were passed over, and why.
     pub skipped: Vec<(PathBuf, String)>,
+    /// The mesh that the expressions are on, at rest, where it is another than the face: they
+    /// reach the face by its own registration.
+    pub neutral: Option<Mesh>,
 }
 
 /// What can go wrong when shapes are read.
@@ -36,7 +40,7 @@ pub enum OwnShapesError {
     /// A shape is on another mesh.
     #[error(
         "{} has {found} vertices, the neutral face {expected}: export every shape from the same \
-         mesh, in the same vertex order",
+         mesh, in the same vertex order, or put that mesh at rest beside them (neutral.obj)",
         path.display()
     )]
     VertexCount {
@@ -82,8 +86,11 @@ const REST_TOLERANCE: f64 = 1e-4;
 /// Reads the shapes of a face that are shapes of the template too: every mesh of a folder that
 /// is named like one, or every morph target of a glTF file.
 ///
+/// Shapes may be on another mesh of the same face, where the folder has that mesh at rest; a
+/// shape that comes as two halves (ICT-FaceKit's `browInnerUp_L` and `_R`) is their sum.
+///
 /// - `source`: the folder or file
-/// - `neutral`: the face at rest, whose vertices every shape has
+/// - `neutral`: the face at rest
 ///
 /// # Errors
 ///
@@ -113,9 +120,21 @@ fn read_folder(
     template: &Template,
     found: &mut OwnShapes,
 ) -> Result<(), OwnShapesError> {
+    if let Some(path) = neutral_of_shapes(folder)? {
+        let own = read_mesh(&path)?;
+        found.neutral = (own.vertex_count() != neutral.vertex_count()).then_some(own);
+    }
+    let neutral = &found.neutral.clone().unwrap_or_else(|| neutral.clone());
+    let mut halves: BTreeMap<&str, Vec<(PathBuf, Mesh)>> = BTreeMap::new();
     for path in mesh_files(folder)? {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         if is_neutral(&stem) {
+            continue;
+        }
+        if let Some(whole) = whole_of_half(&stem) {
+            let mesh = read_mesh(&path)?;
+            check_count(&path, &mesh, neutral)?;
+            halves.entry(whole).or_default().push((path, mesh));
             continue;
         }
         let Some((name, weights)) = shapes_of_name(&stem, template) else {
@@ -130,7 +149,40 @@ fn read_folder(
             positions: mesh.positions().to_vec(),
         });
     }
+    for (whole, mut parts) in halves {
+        let Some((name, weights)) = shapes_of_name(whole, template) else {
+            continue;
+        };
+        if parts.len() != 2 {
+            let reason = format!("one half of {whole} without the other");
+            found
+                .skipped
+                .extend(parts.drain(..).map(|(path, _)| (path, reason.clone())));
+            continue;
+        }
+        let sides = parts[0].1.positions().iter().zip(parts[1].1.positions());
+        let sums = sides.zip(neutral.positions());
+        let positions = sums.map(|((a, b), rest)| a + (b - rest)).collect();
+        found.expressions.push(Expression {
+            name,
+            weights,
+            positions,
+        });
+    }
     Ok(())
+}
+
+/// The shape of both sides that a name is the left or right half of.
+fn whole_of_half(name: &str) -> Option<&'static str> {
+    const SIDES: [&str; 6] = ["_L", "_R", "_l", "_r", "Left", "Right"];
+    if match_shape(name).is_some() {
+        return None;
+    }
+    let base = SIDES.iter().find_map(|side| name.strip_suffix(side))?;
+    match match_shape(base)? {
+        ShapeMatch::One(shape) => Some(ARKIT_SHAPES[shape]),
+        ShapeMatch::Both(..) => None,
+    }
 }
 
 fn read_morph_targets(
@@ -140,7 +192,11 @@ fn read_morph_targets(
     found: &mut OwnShapes,
 ) -> Result<(), OwnShapesError> {
     let file = read_mesh_with_shapes(path)?;
-    check_count(path, &file.mesh, neutral)?;
+    if file.mesh.vertex_count() != neutral.vertex_count() {
+        push_targets(path, &file.shapes, &file.mesh, template, found);
+        found.neutral = Some(file.mesh);
+        return Ok(());
+    }
     let pairs = neutral.positions().iter().zip(file.mesh.positions());
     let distances = pairs.map(|(p, q)| (p - q).norm()).enumerate();
     let (vertex, distance) = distances
@@ -155,7 +211,18 @@ fn read_morph_targets(
             distance,
         });
     }
-    for shape in &file.shapes {
+    push_targets(path, &file.shapes, neutral, template, found);
+    Ok(())
+}
+
+fn push_targets(
+    path: &Path,
+    shapes: &[MeshShape],
+    neutral: &Mesh,
+    template: &Template,
+    found: &mut OwnShapes,
+) {
+    for shape in shapes {
         let Some((name, weights)) = shapes_of_name(&shape.name, template) else {
             let target = format!("{}#{}", path.display(), shape.name);
             found.skipped.push((target.into(), NO_SHAPE.to_owned()));
@@ -167,7 +234,6 @@ fn read_morph_targets(
             positions: shape.positions(neutral),
         });
     }
-    Ok(())
 }
 
 const NO_SHAPE: &str = "its name is no shape of ARKit";
@@ -272,6 +338,24 @@ mod tests {
             &[[0, 1, 2], [1, 3, 2]],
         )
         .unwrap();
+        let found = read_own_shapes(&folder, &square, template).unwrap();
+        assert_eq!(
+            found.neutral,
+            Some(neutral.clone()),
+            "shapes of another mesh"
+        );
+        write("browInnerUp_L.obj", &neutral);
+        write("cheekPuff_R.obj", &neutral);
+        write("cheekPuff_L.obj", &neutral);
+        let found = read_own_shapes(&folder, &neutral, template).unwrap();
+        let names: Vec<&str> = found.expressions.iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["browInnerUp", "mouthSmileLeft", "cheekPuff"]);
+        assert_eq!(
+            found.skipped.len(),
+            2,
+            "a half without the other, and a hat"
+        );
+        assert_eq!(found.neutral, None);
         write("jawOpen.obj", &square);
         let error = read_own_shapes(&folder, &neutral, template).unwrap_err();
         assert!(

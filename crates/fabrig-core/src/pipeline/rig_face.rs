@@ -22,6 +22,9 @@ pub struct RigFaceOptions {
     pub rig: RigOptions,
     /// Expressions of this very face, to which amplitudes are fitted.
     pub expressions: Vec<Expression>,
+    /// The mesh at rest that the expressions are on, where it is another mesh of the same face;
+    /// it is registered by itself.
+    pub expressions_on: Option<Mesh>,
 }
 
 /// A face with its rig.
@@ -78,7 +81,19 @@ pub fn rig_face(
         return Err(crate::registration::RegistrationError::Cancelled { stage: "build" }.into());
     }
     let clock = Instant::now();
-    let examples = carry_expressions(face, &registration, template, &options.expressions)?;
+    let examples = match &options.expressions_on {
+        None => carry_expressions(face, &registration, template, &options.expressions)?,
+        Some(other) => {
+            let automatic = RegistrationOptions::default();
+            let own = register(other, template, &automatic, &mut |step| {
+                progress(Progress {
+                    fraction: REGISTRATION_SHARE,
+                    ..step
+                })
+            })?;
+            carry_expressions(other, &own, template, &options.expressions)?
+        }
+    };
     let mut registration = registration;
     let mut cut_mesh = None;
     let mut origins = None;

@@ -213,6 +213,25 @@ fn skin_regions(template: &Template, places: &[Option<SurfacePoint>]) -> Vec<Opt
     places.map(|place| place.as_ref().map(region_of)).collect()
 }
 
+/// The rig of a template's own skin: nothing is registered.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn rig_of_template(template: &Template, options: &RigOptions) -> Result<Rig, RigError> {
+    let places = places_of_self(template);
+    let face = FaceOnTemplate {
+        face: &template.skin,
+        to_head: Similarity3::identity(),
+        positions: template.skin.positions(),
+        places: &places,
+        rigid: &[],
+        examples: &[],
+        report: String::new(),
+    };
+    build(&face, template, options)
+}
+
 /// Places of a template's own skin vertices on itself: registration that is exact.
 pub fn places_of_self(template: &Template) -> Vec<SurfacePoint> {
     let mut places = vec![None; template.skin.vertex_count()];

@@ -14,7 +14,7 @@ mod sockets;
 mod template_side;
 mod tongue;
 
-pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self};
+pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self, rig_of_template};
 pub use error::RigError;
 pub use expressions::{Expression, carry_expressions};
 pub use file::FORMAT_VERSION;

@@ -76,7 +76,7 @@ fn owners(mirror: &[u32]) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// The mirror image of a vector through the plane x = 0.
-fn reflect(v: Vector) -> Vector {
+pub(super) fn reflect(v: Vector) -> Vector {
     Vector::new(0.0 - v.x, v.y, v.z)
 }
 

@@ -11,6 +11,7 @@ mod identity;
 mod load;
 mod pack;
 mod people;
+mod store;
 
 pub use demo::{demo_contact_colliders, demo_contact_take, demo_face, demo_take};
 pub use error::TemplateError;

@@ -234,6 +234,7 @@ def rig(
     expressions: Mapping[str, ArrayLike] | None = None,
     alpha: str = "own",
     offsets: str = "global",
+    template: Path | None = None,
     progress: Progress | None = None,
 ) -> Rig: ...
 def animate(

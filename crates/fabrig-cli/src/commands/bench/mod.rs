@@ -8,6 +8,7 @@ mod registration;
 mod runtime;
 mod stability;
 mod table3;
+mod table3_page;
 
 use anyhow::Result;
 

@@ -10,11 +10,16 @@ use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::{neutral_of_shapes, read_own_shapes};
 use fabrig_core::template::{self, Template};
 
+use super::table3_page::{self, FITTED, Loss};
 use crate::cli::BenchTable3Args;
-use crate::commands::Outcome;
+use crate::commands::html::write_page;
+use crate::commands::{Outcome, check_output};
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &BenchTable3Args) -> Result<Outcome> {
+    if let Some(path) = &args.html {
+        check_output(path)?;
+    }
     let template = template::human();
     let faces = if args.folders.is_empty() {
         synthetic_faces(template, &args.filter)?
@@ -49,6 +54,9 @@ pub(crate) fn run(console: &Console, args: &BenchTable3Args) -> Result<Outcome> 
         }
     }
     console.clear();
+    if let Some(path) = &args.html {
+        write_page(path, &table3_page::page(console, &faces, &table)?)?;
+    }
     if args.json {
         console.result(&serde_json::to_string_pretty(&table)?);
     } else {
@@ -125,6 +133,7 @@ fn print_table(console: &Console, table: &Table3) {
         }
         console.result(&line);
     }
+    print_losses(console, table);
     for (face, reason) in &table.refused {
         console.result(&format!("{face}: {reason}"));
     }
@@ -134,4 +143,19 @@ fn print_table(console: &Console, table: &Table3) {
          distance [mm] from the face's own pose",
         table.faces.len()
     ));
+}
+
+/// Where the paper's way, an amplitude a patch fitted to the face's shapes, loses to delta
+/// transfer, and why, face by face.
+fn print_losses(console: &Console, table: &Table3) {
+    console.result("");
+    console.result(&format!("where '{FITTED}' loses to '{}'", METHODS[0].name));
+    for face in &table.faces {
+        for pose in POSES {
+            if let Some(loss) = Loss::of(face, FITTED, pose.name) {
+                console.result(&format!("{:<24}{:<18}{loss}", face.face, pose.name));
+            }
+        }
+    }
+    console.result("");
 }
