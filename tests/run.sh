@@ -30,5 +30,9 @@ python="$target/venv/bin/python"
 rm -rf "$target/wheels"
 "$python" -m maturin build --release -m crates/fabrig-py/Cargo.toml --out "$target/wheels"
 "$python" -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
+# Khronos' glTF validator is a package of Node's, which requirements.txt brings.
+"$target/venv/bin/npm" install --silent --no-fund --prefix "$target/gltf-validator" gltf-validator@2.0.0-dev.3.10
+export FABRIG_GLTF_VALIDATOR
+FABRIG_GLTF_VALIDATOR=$(realpath "$target/gltf-validator")
 "$python" -m pytest -q crates/fabrig-py/tests tests
 "$python" benches/peers/run.py --smoke --json "$target/peers.json"

@@ -1,5 +1,9 @@
 //! The command line as types.
 
+mod export;
+
+pub(crate) use export::{ConvertArgs, ExportArgs, LayoutArgs, Target};
+
 use fabrig_core::transfer::{AlphaMode, OffsetMode};
 use std::path::PathBuf;
 
@@ -26,6 +30,11 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Say whether every shape of a rig does on its face what it should; exit code 3 where not
     Check(CheckArgs),
+    /// Write a rig with its 52 shapes, or a take on it, for other programs: glTF, USD, OBJ,
+    /// NumPy, point caches
+    Export(ExportArgs),
+    /// Write a recording for other programs
+    Convert(ConvertArgs),
     /// Fit the shapes of a rig to markers or an animated mesh, and write the take
     Retarget(RetargetArgs),
     /// Look at and change single muscles of a rig
@@ -285,6 +294,10 @@ pub(crate) struct SceneArgs {
     /// Let lips stick to each other
     #[arg(long)]
     pub(crate) sticky_lips: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RecordingArgs {
     /// Skin meshes per second in the recording, 0 for none
     #[arg(long, default_value_t = RecordingOptions::default().skin_hz, value_parser = parse_rate)]
     pub(crate) skin_hz: f64,
@@ -313,9 +326,9 @@ pub(crate) enum ContactPairs {
     All,
 }
 
-impl SceneArgs {
+impl RecordingArgs {
     /// How often what is written.
-    pub(crate) fn recording(&self) -> RecordingOptions {
+    pub(crate) fn options(&self) -> RecordingOptions {
         RecordingOptions {
             skin_hz: self.skin_hz,
             patches_hz: self.patches_hz,
@@ -341,6 +354,8 @@ pub(crate) struct AnimateArgs {
     pub(crate) take: TakeArgs,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
 }
 
 #[derive(Debug, Args)]
@@ -447,6 +462,8 @@ pub(crate) struct DemoArgs {
     pub(crate) pictures: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
 }
 
 /// What the demo plays.

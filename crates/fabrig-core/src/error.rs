@@ -42,5 +42,7 @@ pub enum Error {
     #[error(transparent)]
     Scene(#[from] crate::scene::SceneError),
     #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
+    #[error(transparent)]
     Recording(#[from] crate::recording::RecordingError),
 }

@@ -25,6 +25,7 @@ pub mod collision;
 pub mod edit;
 mod error;
 pub mod evaluation;
+pub mod export;
 pub mod facs;
 pub mod mesh;
 pub mod motion;

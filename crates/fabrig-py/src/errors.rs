@@ -55,6 +55,13 @@ create_exception!(
     "A recording could not be written."
 );
 
+create_exception!(
+    fabrig,
+    ExportError,
+    FabrigError,
+    "A face could not be written for another program."
+);
+
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = m.py();
     m.add("FabrigError", py.get_type::<FabrigError>())?;
@@ -65,6 +72,7 @@ pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("RigError", py.get_type::<RigError>())?;
     m.add("MotionError", py.get_type::<MotionError>())?;
     m.add("SceneError", py.get_type::<SceneError>())?;
+    m.add("ExportError", py.get_type::<ExportError>())?;
     m.add("RecordingError", py.get_type::<RecordingError>())
 }
 
@@ -97,6 +105,7 @@ pub(crate) fn to_py(error: impl Into<Error>) -> PyErr {
         | Error::Skin(_) => RigError::new_err(message),
         Error::Motion(_) | Error::Facs(_) => MotionError::new_err(message),
         Error::Scene(_) | Error::Cloth(_) => SceneError::new_err(message),
+        Error::Export(_) => ExportError::new_err(message),
         Error::Recording(_) => RecordingError::new_err(message),
         // The core may gain variants.
         _ => FabrigError::new_err(message),

@@ -6,6 +6,7 @@
 mod arrays;
 mod cloth;
 mod errors;
+mod export;
 mod mesh;
 mod motion;
 mod pipeline;
@@ -28,10 +29,12 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<template::PyTemplate>()?;
     m.add_function(wrap_pyfunction!(template::template_pack, m)?)?;
     m.add_function(wrap_pyfunction!(mesh::read_mesh, m)?)?;
+    m.add_function(wrap_pyfunction!(mesh::read_shapes, m)?)?;
     m.add_function(wrap_pyfunction!(mesh::demo_face, m)?)?;
     m.add_function(wrap_pyfunction!(motion::read_motion, m)?)?;
     m.add_function(wrap_pyfunction!(motion::demo_take, m)?)?;
     m.add_function(wrap_pyfunction!(pipeline::rig, m)?)?;
     m.add_function(wrap_pyfunction!(pipeline::animate, m)?)?;
+    m.add_function(wrap_pyfunction!(export::convert, m)?)?;
     Ok(())
 }

@@ -6,6 +6,7 @@ use fabrig_core::mesh::{Mesh, io};
 use fabrig_core::template;
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::errors::to_py;
@@ -65,6 +66,24 @@ impl PyMesh {
 pub(crate) fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<PyMesh> {
     let inner = py.detach(|| io::read_mesh(path)).map_err(to_py)?;
     Ok(PyMesh { inner })
+}
+
+/// The shapes that a mesh file holds beside its mesh (morph targets of glTF), by name: the
+/// vertices (N, 3) at weight 1, in the file's units.
+///
+/// >>> mesh, shapes = fabrig.read_mesh("face.glb"), fabrig.read_shapes("face.glb")
+/// >>> rig = fabrig.rig(mesh, expressions=shapes)
+#[pyfunction]
+pub(crate) fn read_shapes<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+    let file = py
+        .detach(|| io::read_mesh_with_shapes(path))
+        .map_err(to_py)?;
+    let shapes = PyDict::new(py);
+    for shape in &file.shapes {
+        let positions = arrays::from_points(py, &shape.positions(&file.mesh));
+        shapes.set_item(&shape.name, positions)?;
+    }
+    Ok(shapes)
 }
 
 /// The bundled face: not the template, in metres, turned, with eyes and teeth.

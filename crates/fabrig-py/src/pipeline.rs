@@ -15,6 +15,7 @@ use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::errors::{input, to_py};
+use crate::mesh::PyMesh;
 use crate::motion::PyClip;
 use crate::progress::Progress;
 use crate::rig::PyRig;
@@ -23,7 +24,8 @@ use crate::template::template_of;
 
 /// Makes the rig of a neutral face.
 ///
-/// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists
+/// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists;
+///   or a `Mesh` alone, which keeps its texture coordinates and groups
 /// - `landmarks`: name -> (x, y, z) in the mesh's own units
 /// - `unit_mm`: millimetres per unit, where it is known
 /// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
@@ -37,14 +39,14 @@ use crate::template::template_of;
 /// - `progress`: called with (stage, share)
 #[pyfunction]
 #[pyo3(signature = (
-    vertices, faces, *, landmarks=None, unit_mm=None, cut_seams=None, expressions=None,
+    vertices, faces=None, *, landmarks=None, unit_mm=None, cut_seams=None, expressions=None,
     alpha="own", offsets="global", template=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
-    faces: &Bound<'_, PyAny>,
+    faces: Option<&Bound<'_, PyAny>>,
     landmarks: Option<BTreeMap<String, [f64; 3]>>,
     unit_mm: Option<f64>,
     cut_seams: Option<Vec<String>>,
@@ -54,9 +56,16 @@ pub(crate) fn rig(
     template: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
-    let positions = arrays::points("vertices", vertices)?;
-    let polygons = arrays::polygons("faces", faces)?;
-    let face = Mesh::new(positions, polygons).map_err(to_py)?;
+    let face = match (vertices.cast::<PyMesh>(), faces) {
+        (Ok(mesh), None) => mesh.get().inner.clone(),
+        (Ok(_), Some(_)) => return Err(input("faces: the mesh given has its own")),
+        (Err(_), None) => return Err(input("faces: needed beside an array of vertices")),
+        (Err(_), Some(faces)) => {
+            let positions = arrays::points("vertices", vertices)?;
+            let polygons = arrays::polygons("faces", faces)?;
+            Mesh::new(positions, polygons).map_err(to_py)?
+        }
+    };
     let mut options = RigFaceOptions::default();
     options.registration.unit_mm = unit_mm;
     for name in cut_seams.unwrap_or_default() {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use fabrig_core::edit::{Edits, load_edited_rig};
 use fabrig_core::evaluation::{CheckGates, GATES, check_rig};
+use fabrig_core::export::ExportOptions;
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::Scene;
 use fabrig_core::template;
@@ -14,7 +15,9 @@ use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::errors::{input, to_py};
+use crate::export::{Layout, shape_source};
 use crate::mesh::PyMesh;
+use crate::motion::PyClip;
 use crate::progress::Progress;
 
 /// A face that is ready to move.
@@ -59,6 +62,62 @@ impl PyRig {
     /// Saves the rig as one file.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(path)).map_err(to_py)
+    }
+
+    /// Writes the rig for other programs; returns a report.
+    ///
+    /// - `path`: .glb, .gltf, .usda, .npz, .pc2, .mdd, or a folder for OBJ files
+    /// - `motion`: a take, which becomes an animation of the 52 shapes; `baked`: of the simulated
+    ///   vertices instead, always so for point caches and OBJ
+    /// - `face`: the mesh that the rig was made from, for its materials and textures
+    /// - `unit`: "own", "mm", "cm", "m" or "in"; metres for glTF by default, else the face's own
+    /// - `shapes`: "settled" takes them from the cloth at rest, "targets" from the muscle shapes
+    ///   alone, which is quicker
+    /// - `components`: morph targets of a baked glTF; as many as `tolerance` (mm) needs by default
+    /// - `check`: whether the sum of the shapes is compared with the simulation
+    /// - `scene`: a mapping of the fields of a scene file
+    /// - `progress`: called with (stage, share)
+    ///
+    /// >>> rig.export("face.glb", motion=fabrig.demo_take())["linear"]["rms_mm"]
+    #[pyo3(signature = (path, *, motion=None, baked=false, face=None, unit=None, name=None,
+                        fps=None, shapes="settled", still_head=false, components=None,
+                        tolerance=None, check=true, scene=None, progress=None))]
+    #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        path: PathBuf,
+        motion: Option<&PyClip>,
+        baked: bool,
+        face: Option<PathBuf>,
+        unit: Option<&str>,
+        name: Option<String>,
+        fps: Option<f64>,
+        shapes: &str,
+        still_head: bool,
+        components: Option<usize>,
+        tolerance: Option<f64>,
+        check: bool,
+        scene: Option<Bound<'py, PyAny>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let layout = Layout {
+            face,
+            unit,
+            name,
+            still_head,
+            components,
+            tolerance,
+        };
+        let options = ExportOptions {
+            baked,
+            fps,
+            shapes: shape_source(shapes)?,
+            check_sum: check,
+            scene: crate::simulation::scene(scene.as_ref(), None, None, None, true)?,
+            ..layout.options()?
+        };
+        crate::export::export(py, self, path, motion, options, progress)
     }
 
     /// The user's mesh, in its own units and vertex order.

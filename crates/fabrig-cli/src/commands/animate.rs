@@ -26,11 +26,11 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
         fps: args.scene.fps,
         rig_name: stem(&args.rig),
         take_name: stem(&args.motion),
-        recording: args.scene.recording(),
+        recording: args.recording.options(),
     };
     let scene = scene(&args.scene)?;
     let report = record(console, rig, clip, scene, &args.output, &options)?;
-    if args.scene.json {
+    if args.recording.json {
         console.result(&serde_json::to_string_pretty(&report)?);
     } else {
         print_report(console, &report);

@@ -36,7 +36,7 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     if let Some(path) = &args.rig {
         rigged.rig.save(path)?;
     }
-    if !args.scene.json {
+    if !args.recording.json {
         rig::print_report(console, &rigged);
         console.result("");
     }
@@ -44,13 +44,13 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
         fps: args.scene.fps,
         rig_name: "demo".to_owned(),
         take_name: name.to_owned(),
-        recording: args.scene.recording(),
+        recording: args.recording.options(),
     };
     let registration = rigged.report;
     let (positions, hinge) = (rigged.rig.positions.clone(), rigged.rig.jaw.hinge);
     let scene = played_scene(args)?;
     let report = record(console, rigged.rig, clip, scene, &args.output, &options)?;
-    if args.scene.json {
+    if args.recording.json {
         let both = json!({ "rig": registration, "animation": report });
         console.result(&serde_json::to_string_pretty(&both)?);
     } else {

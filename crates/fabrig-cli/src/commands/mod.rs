@@ -4,8 +4,10 @@ mod animate;
 mod bench;
 mod check;
 mod contact_pictures;
+mod convert;
 mod demo;
 mod edit;
+mod export;
 mod html;
 mod info;
 mod pose;
@@ -43,6 +45,8 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
         Command::Animate(args) => animate::run(console, &args),
         Command::Demo(args) => demo::run(console, &args),
         Command::Check(args) => check::run(console, &args),
+        Command::Export(args) => export::run(console, &args),
+        Command::Convert(args) => convert::run(console, &args),
         Command::Retarget(args) => retarget::run(console, &args),
         Command::Edit(command) => edit::run(console, &command),
         Command::Render(args) => render::run(console, &args),

@@ -9,6 +9,7 @@
 from ._fabrig import (
     Clip,
     Cloth,
+    ExportError,
     FabrigError,
     InputError,
     Mesh,
@@ -24,10 +25,12 @@ from ._fabrig import (
     TemplateError,
     __version__,
     animate,
+    convert,
     demo_face,
     demo_take,
     read_mesh,
     read_motion,
+    read_shapes,
     rig,
     template,
 )
@@ -35,6 +38,7 @@ from ._fabrig import (
 __all__ = [
     "Clip",
     "Cloth",
+    "ExportError",
     "FabrigError",
     "InputError",
     "Mesh",
@@ -50,10 +54,12 @@ __all__ = [
     "TemplateError",
     "__version__",
     "animate",
+    "convert",
     "demo_face",
     "demo_take",
     "read_mesh",
     "read_motion",
+    "read_shapes",
     "rig",
     "template",
 ]

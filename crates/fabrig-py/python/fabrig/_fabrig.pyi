@@ -15,6 +15,7 @@ class RegistrationError(FabrigError): ...
 class RigError(FabrigError): ...
 class MotionError(FabrigError): ...
 class SceneError(FabrigError): ...
+class ExportError(FabrigError): ...
 class RecordingError(FabrigError): ...
 
 Faces = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
@@ -86,6 +87,24 @@ class Rig:
     def load(path: Path, *, edits: bool = True) -> Rig: ...
     def with_edits(self, path: Path) -> Rig: ...
     def save(self, path: Path) -> None: ...
+    def export(
+        self,
+        path: Path,
+        *,
+        motion: Clip | None = None,
+        baked: bool = False,
+        face: Path | None = None,
+        unit: str | None = None,
+        name: str | None = None,
+        fps: float | None = None,
+        shapes: str = "settled",
+        still_head: bool = False,
+        components: int | None = None,
+        tolerance: float | None = None,
+        check: bool = True,
+        scene: Mapping[str, Any] | None = None,
+        progress: Progress | None = None,
+    ) -> dict[str, Any]: ...
     @property
     def mesh(self) -> Mesh: ...
     @property
@@ -210,6 +229,7 @@ class Simulation:
     def patch(self, name: str) -> NDArray[np.float32]: ...
 
 def read_mesh(path: Path) -> Mesh: ...
+def read_shapes(path: Path) -> dict[str, NDArray[np.float64]]: ...
 def demo_face() -> Mesh: ...
 def template() -> Template: ...
 def demo_take() -> Clip: ...
@@ -225,8 +245,8 @@ def read_motion(
     swap_sides: bool = False,
 ) -> Clip: ...
 def rig(
-    vertices: ArrayLike,
-    faces: Faces,
+    vertices: ArrayLike | Mesh,
+    faces: Faces | None = None,
     *,
     landmarks: Mapping[str, Sequence[float]] | None = None,
     unit_mm: float | None = None,
@@ -248,5 +268,18 @@ def animate(
     wind: ArrayLike | None = None,
     substeps: int | None = None,
     dynamics: bool = True,
+    progress: Progress | None = None,
+) -> dict[str, Any]: ...
+def convert(
+    recording: Path,
+    output: Path,
+    *,
+    rig: Rig | None = None,
+    face: Path | None = None,
+    unit: str | None = None,
+    name: str | None = None,
+    still_head: bool = False,
+    components: int | None = None,
+    tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]: ...

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use ::gltf::buffer::{Data, Source};
 use ::gltf::mesh::Mode;
 use ::gltf::{Gltf, Primitive, Semantic};
 use nalgebra::Matrix4;
 use serde_json::Value;
 
 use super::gltf_accessor::Buffers;
+use super::gltf_file::{buffers_of, document_of, list};
 use super::{MeshIoError, MeshShape, MeshWithShapes};
 use crate::mesh::{CornerUvs, FaceGroup, Mesh, Polygons};
 use crate::{Point, Vector};
@@ -319,75 +319,7 @@ fn accessors_of(primitive: &Primitive<'_>) -> Option<SharedVertices> {
     })
 }
 
-/// The contents of a document's buffers.
-pub(super) fn buffers_of(
-    document: &::gltf::Document,
-    blob: Option<Vec<u8>>,
-    path: &Path,
-) -> Result<Vec<Data>, String> {
-    for buffer in document.buffers() {
-        match buffer.source() {
-            // The glTF crate takes for granted that names are text.
-            Source::Uri(uri) if !uri.contains(':') && decoded(uri).is_none() => {
-                return Err(format!("'{uri}' is not the name of a file"));
-            }
-            _ => {}
-        }
-    }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    ::gltf::import_buffers(document, Some(folder), blob).map_err(|e| e.to_string())
-}
-
-/// A relative URI without its percent signs; `None` where that is no text.
-pub(super) fn decoded(uri: &str) -> Option<String> {
-    let hex = |byte: Option<&u8>| byte.and_then(|b| char::from(*b).to_digit(16));
-    let (bytes, mut decoded, mut k) = (uri.as_bytes(), Vec::new(), 0);
-    while k < bytes.len() {
-        match (bytes[k], hex(bytes.get(k + 1)), hex(bytes.get(k + 2))) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((16 * high + low) as u8);
-                k += 3;
-            }
-            (byte, ..) => {
-                decoded.push(byte);
-                k += 1;
-            }
-        }
-    }
-    String::from_utf8(decoded).ok()
-}
-
-/// A document as plain JSON and as the glTF crate has it.
-pub(super) fn document_of(bytes: &[u8]) -> Result<(Value, Gltf), String> {
-    let glb;
-    let json: &[u8] = if bytes.starts_with(b"glTF") {
-        glb = ::gltf::Glb::from_slice(bytes).map_err(|e| e.to_string())?;
-        &glb.json
-    } else {
-        bytes
-    };
-    let root: Value = serde_json::from_slice(json).map_err(|e| e.to_string())?;
-    // The glTF crate looks the positions up before it has checked that they are there.
-    let count = list(&root["accessors"]).len();
-    for mesh in list(&root["meshes"]) {
-        for primitive in list(&mesh["primitives"]) {
-            let position = primitive["attributes"]["POSITION"].as_u64();
-            if let Some(index) = position.filter(|&index| index >= count as u64) {
-                return Err(format!(
-                    "a primitive has its positions in accessor {index}, but there are {count}"
-                ));
-            }
-        }
-    }
-    let document = Gltf::from_slice(bytes).map_err(|e| e.to_string())?;
-    Ok((root, document))
-}
-
-fn list(value: &Value) -> &[Value] {
-    value.as_array().map_or(&[], Vec::as_slice)
-}
-
-/// `extras.targetNames` of every mesh, which the glTF crate does not read.
+/// `extras.targetNames` of every mesh, whatever else stands there.
 fn target_names(root: &Value) -> Vec<Vec<String>> {
     let names_of = |mesh: &Value| -> Vec<String> {
         let names = list(&mesh["extras"]["targetNames"]).iter();

@@ -7,12 +7,16 @@
 mod error;
 mod gltf;
 mod gltf_accessor;
+mod gltf_file;
 mod obj;
 mod ply;
 mod read;
 mod shapes;
 mod stl;
 mod write;
+
+pub(crate) use gltf_file::GltfFile;
+pub(crate) use obj::logical_lines;
 
 pub use error::{MeshIoError, ObjProblem};
 pub use obj::parse_obj;

@@ -40,7 +40,9 @@ fn at_line(path: &Path, line: usize, problem: ObjProblem) -> MeshIoError {
 }
 
 /// Lines without comments, numbered from 1, continued lines joined under their first number.
-fn logical_lines(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
+pub(crate) fn logical_lines(
+    text: &str,
+) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
