@@ -8,8 +8,8 @@ use crate::template::{EyeSocket, JawHinge, Template};
 use crate::transfer::{
     AlphaField, AlphaMode, Amplitudes, Example, FaceOffsets, JawField, JawShapes, LidClosing,
     LidField, MuscleShape, Observation, OffsetMode, PatchEvidence, PatchTransfer, ShapeSampler,
-    check_examples, fit_alphas, fit_maps, fit_open_angle, muscle_shapes_on_face, offsets_on_face,
-    size_ratio,
+    TURN_ALONE, check_examples, fit_alphas, fit_maps, fit_open_angle, jaw_with_shares,
+    muscle_shapes_on_face, offsets_on_face, size_ratio,
 };
 use crate::{Point, Vector};
 
@@ -164,14 +164,63 @@ impl<'a> ShapesOnFace<'a> {
             let shape = example.shape().map(|shape| shape as u32);
             shape.is_some() && shape == jaw_shapes.open
         };
+        let hinge = JawHinge {
+            open_angle,
+            ..*self.face.hinge
+        };
         if mode == AlphaMode::Own && examples.iter().any(is_jaw) {
-            let hinge = JawHinge {
-                open_angle,
-                ..*self.face.hinge
-            };
             self.jaws = split_jaws(&hinge, &jaw_shapes, &self.muscles, self.face.patches);
+        } else if amplitudes.jaw.iter().any(|shares| *shares != TURN_ALONE) {
+            self.jaws = self.jaws_with_shares(&amplitudes, &hinge, &jaw_shapes);
         }
         Ok((self.transfers(&amplitudes), open_angle))
+    }
+
+    /// The patches under the jaw with fitted shares, which neighbours have alike where they meet.
+    fn jaws_with_shares(
+        &self,
+        amplitudes: &Amplitudes,
+        hinge: &JawHinge,
+        jaw_shapes: &JawShapes,
+    ) -> Vec<Option<JawField>> {
+        let FaceSide {
+            template, patches, ..
+        } = self.face;
+        let with_jaw = || (0..patches.len()).filter(|&p| self.jaws[p].is_some());
+        // Fields are about 1.
+        let turn = with_jaw().map(|p| (&patches[p], amplitudes.jaw[p][0]));
+        let turn = AlphaField::new(template, turn);
+        let straight = with_jaw().map(|p| (&patches[p], 1.0 + amplitudes.jaw[p][1]));
+        let straight = AlphaField::new(template, straight);
+        let of_patches = self.field_of(&amplitudes.by_patch);
+        self.evidence()
+            .iter()
+            .zip(patches)
+            .map(|(evidence, patch)| {
+                let nodes = &patch.chart.nodes;
+                let shares: Vec<[f64; 2]> = nodes
+                    .iter()
+                    .map(|node| [turn.at(node), straight.at(node) - 1.0])
+                    .collect();
+                let mut jaw = jaw_with_shares(evidence, hinge, jaw_shapes, &shares)?;
+                // What is besides the turn is whole already; amplitudes will scale it.
+                let factors: Vec<f64> = nodes.iter().map(|n| 1.0 / of_patches.at(n)).collect();
+                jaw.scale_residuals(&factors);
+                Some(jaw)
+            })
+            .collect()
+    }
+
+    /// The patches before any amplitude.
+    fn evidence(&self) -> Vec<PatchEvidence<'_>> {
+        (0..self.face.patches.len())
+            .map(|p| PatchEvidence {
+                neutral: &self.face.patches[p].neutral,
+                shapes: &self.muscles[p],
+                jaw: self.jaws[p].as_ref(),
+                prior: self.priors[p],
+            })
+            .collect()
     }
 
     /// The face's own shapes in the place of the template's, where it has them.
@@ -224,14 +273,7 @@ impl<'a> ShapesOnFace<'a> {
                 }
             })
             .collect();
-        let evidence: Vec<PatchEvidence<'_>> = (0..face.patches.len())
-            .map(|p| PatchEvidence {
-                neutral: &face.patches[p].neutral,
-                shapes: &self.muscles[p],
-                jaw: self.jaws[p].as_ref(),
-                prior: self.priors[p],
-            })
-            .collect();
+        let evidence = self.evidence();
         let jaw_shapes = JawShapes::of(face.template);
         let open_angle = fit_open_angle(face.hinge, &jaw_shapes, &evidence, &observations);
         let hinge = JawHinge {

@@ -10,10 +10,10 @@
 //! One amplitude a patch and shape solves the same for all shapes of a patch at once, drawn to
 //! the amplitude of the patch.
 //!
-//! What the jaw turns is no matter of amplitude: the angle of its hinge is fitted first, and the
-//! turn taken off.
+//! What the jaw turns has amplitudes of its own: the angle of its hinge is fitted first, then how
+//! far each patch goes along, by the turn and straight; for all other shapes the turn is taken off.
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +30,12 @@ const ALPHA_SPREAD: f64 = 0.3;
 const NODES_PER_OBSERVATION: f64 = 10.0;
 /// The hinge opens by at least and at most these shares of the template's angle.
 const ANGLE_LIMITS: [f64; 2] = [0.4, 1.8];
+/// Shares of turn and straight displacement without examples.
+pub const TURN_ALONE: [f64; 2] = [1.0, 0.0];
+/// Both lie between these.
+const SHARE_LIMITS: [f64; 2] = [-1.0, 2.5];
+/// An example opens the jaw that opens it by more than this.
+const LEAST_OPEN: f32 = 0.2;
 /// Share of the turn from which on a node tells the angle.
 const TURNING_SHARE: f32 = 0.5;
 
@@ -57,14 +63,22 @@ pub struct Amplitudes {
     pub by_patch: Vec<f64>,
     /// Alpha of each of its shapes, in the order of its muscle shapes.
     pub by_shape: Vec<Vec<f64>>,
+    /// How each patch goes with the jaw: share of the turn of the hinge, and of the straight
+    /// displacement that the template draws.
+    pub jaw: Vec<[f64; 2]>,
 }
 
 impl Amplitudes {
-    /// One alpha for all shapes of each patch.
+    /// One alpha for all shapes of each patch, and the jaw's turn as it is.
     pub fn even(by_patch: Vec<f64>, shapes: &[Vec<MuscleShape>]) -> Self {
         let pairs = by_patch.iter().zip(shapes);
         let by_shape = pairs.map(|(a, s)| vec![*a; s.len()]).collect();
-        Self { by_patch, by_shape }
+        let jaw = vec![TURN_ALONE; by_patch.len()];
+        Self {
+            by_patch,
+            by_shape,
+            jaw,
+        }
     }
 }
 
@@ -79,6 +93,14 @@ pub struct PatchEvidence<'a> {
     pub jaw: Option<&'a JawField>,
     /// Amplitude without examples.
     pub prior: f64,
+}
+
+impl PatchEvidence<'_> {
+    /// Straight displacement of a node by a shape, at the prior amplitude. (mm)
+    fn straight(&self, shape: Option<u32>) -> impl Fn(usize) -> Vector {
+        let drawn = self.shapes.iter().find(|s| Some(s.shape) == shape);
+        move |n| drawn.map_or_else(Vector::zeros, |s| s.deltas[n].cast::<f64>() * self.prior)
+    }
 }
 
 /// What examples do to the nodes of every patch.
@@ -102,7 +124,7 @@ pub fn fit_open_angle(
         |o: &Observation, shape: Option<u32>| shape.map_or(0.0, |shape| o.weights[shape as usize]);
     let opened: Vec<&Observation> = observations
         .iter()
-        .filter(|o| weight(o, jaw.open) > 0.2 && weight(o, jaw.close) == 0.0)
+        .filter(|o| weight(o, jaw.open) > LEAST_OPEN && weight(o, jaw.close) == 0.0)
         .collect();
     if opened.is_empty() {
         return hinge.open_angle;
@@ -168,7 +190,86 @@ pub fn fit_alphas(
         })
         .collect();
     let (by_patch, by_shape) = fitted.into_iter().unzip();
-    Amplitudes { by_patch, by_shape }
+    Amplitudes {
+        by_patch,
+        by_shape,
+        jaw: fit_jaw(hinge, jaw, patches, observations),
+    }
+}
+
+/// How each patch goes with the jaw: `a` times the turn of the hinge and `b` times the straight
+/// displacement that the template draws, the least squares of the examples that open the jaw and
+/// do nothing else, drawn to the turn alone. (1, 0) without such an example.
+///
+/// A face whose chin is longer than the template's swings it further by the hinge; only examples
+/// tell whether it does.
+fn fit_jaw(
+    hinge: &JawHinge,
+    jaw: &JawShapes,
+    patches: &[PatchEvidence<'_>],
+    observations: &[Observation],
+) -> Vec<[f64; 2]> {
+    let opened: Vec<(&Observation, f32)> = observations
+        .iter()
+        .filter_map(|o| {
+            let open = o.weights[jaw.open? as usize];
+            let others = o.weights.iter().filter(|w| **w != 0.0).count();
+            (open > LEAST_OPEN && others == 1).then_some((o, open))
+        })
+        .collect();
+    let of_patch = |(p, patch): (usize, &PatchEvidence<'_>)| {
+        let Some(field) = patch.jaw.filter(|_| !opened.is_empty()) else {
+            return TURN_ALONE;
+        };
+        let ridge = Normal::ridge(patch);
+        let mut normal = Matrix2::identity() * ridge;
+        let mut rhs = Vector2::from(TURN_ALONE) * ridge;
+        for (o, open) in &opened {
+            let turned = jaw_motion(patch, field, hinge, *open, 0.0);
+            let straight = patch.straight(jaw.open);
+            let seen = o.deltas[p].iter().enumerate();
+            for (n, y) in seen.filter_map(|(n, y)| Some((n, (*y)?))) {
+                let (turn, line) = (turned[n], straight(n) * f64::from(*open));
+                normal += Matrix2::new(
+                    turn.norm_squared(),
+                    turn.dot(&line),
+                    turn.dot(&line),
+                    line.norm_squared(),
+                );
+                rhs += Vector2::new(turn.dot(&y), line.dot(&y));
+            }
+        }
+        let solved = normal.cholesky().map(|factor| factor.solve(&rhs));
+        solved.map_or(TURN_ALONE, |x| {
+            [0, 1].map(|k| x[k].clamp(SHARE_LIMITS[0], SHARE_LIMITS[1]))
+        })
+    };
+    patches.par_iter().enumerate().map(of_patch).collect()
+}
+
+/// What a patch does under the jaw with shares of turn and straight displacement, node by node;
+/// `None` where the jaw does not move it.
+///
+/// - `hinge`: with the angle of [`fit_open_angle`]
+/// - `shares`: of each node, smooth over the skin: [`Amplitudes::jaw`]
+pub fn jaw_with_shares(
+    patch: &PatchEvidence<'_>,
+    hinge: &JawHinge,
+    jaw: &JawShapes,
+    shares: &[[f64; 2]],
+) -> Option<JawField> {
+    let field = patch.jaw?;
+    let mixed = |open: f32, close: f32, shape: Option<u32>| -> Vec<Vector3<f32>> {
+        let straight = patch.straight(shape);
+        let turned = jaw_motion(patch, field, hinge, open, close);
+        let nodes = turned.iter().zip(shares).enumerate();
+        nodes
+            .map(|(n, (turn, [a, b]))| (turn * *a + straight(n) * *b).cast())
+            .collect()
+    };
+    let opened = mixed(1.0, 0.0, jaw.open);
+    let closed = mixed(0.0, 1.0, jaw.close);
+    JawField::split(hinge, patch.neutral, Some(&opened), Some(&closed))
 }
 
 /// The normal equations of one patch: `A_ij = sum_k w_ki w_kj <Db_i, Db_j>`,
@@ -307,6 +408,7 @@ fn golden_section(f: impl Fn(f64) -> f64, range: [f64; 2], tolerance: f64) -> f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transfer::jaw::turn;
 
     fn hinge() -> JawHinge {
         JawHinge {
@@ -430,5 +532,61 @@ mod tests {
         let angle = fit_open_angle(&own, &jaw, &[patch], &[seen]);
         assert!((angle - 0.3).abs() < 2e-3, "{angle}");
         assert_eq!(fit_open_angle(&own, &jaw, &[patch], &[]), own.open_angle);
+    }
+
+    /// A face whose jaw follows the hinge, and one that goes straight though its chin is longer
+    /// than the template's: both are met, where the hinge alone would miss the second.
+    #[test]
+    fn a_jaw_that_turns_and_one_that_goes_straight_are_both_met() {
+        let hinge = hinge();
+        let neutral = nodes(40);
+        let longer: Vec<Point> = neutral
+            .iter()
+            .map(|p| p + Vector::new(0.0, -25.0, 10.0))
+            .collect();
+        let drawn: Vec<[f32; 3]> = neutral
+            .iter()
+            .map(|p| {
+                let turned = turn(&hinge, hinge.open_angle) * (p - hinge.center);
+                let d = hinge.center + turned - p;
+                [d.x as f32, d.y as f32, d.z as f32]
+            })
+            .collect();
+        let shapes = [shape(0, &drawn)];
+        let field = JawField::split(&hinge, &neutral, Some(&shapes[0].deltas), None).unwrap();
+        let jaw = JawShapes {
+            open: Some(0),
+            ..JawShapes::default()
+        };
+        let patch = PatchEvidence {
+            neutral: &longer,
+            shapes: &shapes,
+            jaw: Some(&field),
+            prior: 1.0,
+        };
+        let hinged = jaw_motion(&patch, &field, &hinge, 1.0, 0.0);
+        let straight: Vec<Vector> = shapes[0].deltas.iter().map(|d| d.cast()).collect();
+        let apart = hinged.iter().zip(&straight).map(|(a, b)| (a - b).norm());
+        assert!(apart.fold(0.0, f64::max) > 5.0, "nothing to tell them by");
+        for (truth, expected) in [(&hinged, [1.0, 0.0]), (&straight, [0.0, 1.0])] {
+            let observation = Observation {
+                weights: vec![1.0],
+                deltas: vec![truth.iter().map(|d| Some(*d)).collect()],
+            };
+            let fitted = fit_jaw(&hinge, &jaw, &[patch], &[observation]);
+            for k in [0, 1] {
+                assert!((fitted[0][k] - expected[k]).abs() < 0.1, "{fitted:?}");
+            }
+            let own = jaw_with_shares(&patch, &hinge, &jaw, &vec![fitted[0]; 40]).unwrap();
+            let with = PatchEvidence {
+                jaw: Some(&own),
+                ..patch
+            };
+            let met = jaw_motion(&with, &own, &hinge, 1.0, 0.0);
+            for (m, y) in met.iter().zip(truth) {
+                assert!((m - y).norm() < 0.6, "{m} {y}");
+            }
+        }
+        assert_eq!(fit_jaw(&hinge, &jaw, &[patch], &[]), [TURN_ALONE]);
     }
 }

@@ -38,7 +38,8 @@ pub use error::TransferError;
 pub use evaluate::{PatchTransfer, ShapeWeights, TransferContext};
 pub use examples::{Example, check_examples};
 pub use fit_alpha::{
-    AlphaMode, Amplitudes, Observation, PatchEvidence, fit_alphas, fit_open_angle,
+    AlphaMode, Amplitudes, Observation, PatchEvidence, TURN_ALONE, fit_alphas, fit_open_angle,
+    jaw_with_shares,
 };
 pub use fit_maps::fit_maps;
 pub use jaw::{JawField, JawMode, JawPose};
