@@ -21,6 +21,7 @@ mod error;
 mod evaluate;
 mod examples;
 mod fit_alpha;
+mod fit_jaw;
 mod fit_maps;
 mod jaw;
 mod lids;
@@ -37,10 +38,8 @@ pub use closing::LidClosing;
 pub use error::TransferError;
 pub use evaluate::{PatchTransfer, ShapeWeights, TransferContext};
 pub use examples::{Example, check_examples};
-pub use fit_alpha::{
-    AlphaMode, Amplitudes, Observation, PatchEvidence, TURN_ALONE, fit_alphas, fit_open_angle,
-    jaw_with_shares,
-};
+pub use fit_alpha::{AlphaMode, Amplitudes, Observation, PatchEvidence, fit_alphas};
+pub use fit_jaw::{TURN_ALONE, fit_open_angle, jaw_with_shares};
 pub use fit_maps::fit_maps;
 pub use jaw::{JawField, JawMode, JawPose};
 pub use lids::{LidField, LidNode};

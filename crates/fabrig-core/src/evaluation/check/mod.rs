@@ -15,6 +15,7 @@
 //! the binding believes, but for the labels of lips and lids; those are put to the test by the
 //! edges of the mesh, which know no labels.
 
+mod findings;
 mod gates;
 mod muscles;
 mod places;

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
+use super::findings::{Findings, Seen};
 use super::gates::CheckGates;
 use super::muscles::compare_muscles;
 use super::places::Places;
-use super::report::{CheckReport, Finding, MuscleCheck, RegionDistance, ShapeCheck};
+use super::report::{CheckReport, MuscleCheck, RegionDistance, ShapeCheck};
 use super::seams::{Crossed, Seams, torn_edges};
 use crate::Vector;
 use crate::mesh::SurfaceError;
@@ -20,10 +21,8 @@ use crate::transfer::TransferError;
 
 /// Correctives that are nothing without another shape.
 const OVER: [(&str, &str); 1] = [("mouthClose", "jawOpen")];
-/// A shape that moves nothing by this much is dead. (mm)
-const DEAD: f64 = 0.1;
 /// A shape that moves the template's skin by less has no amplitude to compare. (mm)
-const TELLING: f64 = 0.5;
+pub(super) const TELLING: f64 = 0.5;
 /// Beyond this from the mid plane of the template a vertex is on one side. (mm)
 const SIDE: f64 = 15.0;
 /// Shapes that close an eye: 1 the left one, 2 the right one.
@@ -167,17 +166,6 @@ pub fn check_rig(
         distances,
         marked,
     })
-}
-
-/// A shape, and the vertices where something shows.
-struct Seen {
-    check: ShapeCheck,
-    wrong_side: Vec<u32>,
-    torn: Vec<[u32; 2]>,
-    flipped: Vec<u32>,
-    leaking: Option<u32>,
-    lips: Crossed,
-    lids: Crossed,
 }
 
 /// What all shapes are compared with.
@@ -411,152 +399,4 @@ fn notes_of(report: &RegistrationReport) -> Vec<String> {
             format!("the {what} are one surface: rig the face with --cut-seams {seam}")
         })
         .collect()
-}
-
-/// Collects what does not hold.
-struct Findings {
-    gates: CheckGates,
-    found: Vec<Finding>,
-}
-
-impl Findings {
-    fn new(gates: CheckGates) -> Self {
-        Self {
-            gates,
-            found: Vec::new(),
-        }
-    }
-
-    fn add(
-        &mut self,
-        gate: &'static str,
-        shape: &str,
-        value: f64,
-        vertex: Option<u32>,
-        text: String,
-    ) {
-        self.found.push(Finding {
-            gate,
-            shape: Some(shape.to_owned()),
-            value,
-            limit: self.gates.get(gate).unwrap_or_default(),
-            vertex,
-            text,
-        });
-    }
-
-    /// Returns the vertices that findings are about.
-    fn of_shape(&mut self, seen: &Seen, in_view: usize, notes: &mut Vec<String>) -> Vec<u32> {
-        let (check, gates) = (&seen.check, self.gates);
-        let shape = check.shape.as_str();
-        let mut marked: Vec<u32> = Vec::new();
-        if check.amplitude_mm < DEAD && check.parts_mm < DEAD {
-            if check.template_mm < TELLING {
-                notes.push(format!(
-                    "{shape} moves nothing: it moves no skin, and the mesh has no part that it \
-                     moves"
-                ));
-            } else {
-                let text = format!(
-                    "{shape} is dead: nothing moves by {DEAD} mm, on the template {:.1} mm",
-                    check.template_mm
-                );
-                self.add("least_ratio", shape, 0.0, None, text);
-            }
-        } else if let (Some(ratio), Some(direction)) = (check.ratio, check.direction) {
-            if ratio < gates.least_ratio {
-                let text = format!("{shape} is weak: {ratio:.2} of the template's amplitude");
-                self.add("least_ratio", shape, ratio, None, text);
-            }
-            if ratio > gates.largest_ratio {
-                let text = format!("{shape} is too strong: {ratio:.2} of the template's amplitude");
-                self.add("largest_ratio", shape, ratio, None, text);
-            }
-            if direction < gates.least_direction {
-                let text = format!(
-                    "{shape} moves another way than on the template (cosine {direction:.2})"
-                );
-                self.add("least_direction", shape, direction, None, text);
-            }
-        }
-        if check.wrong_side as f64 > gates.wrong_side {
-            let text = format!(
-                "{shape}: {} vertices of lips or lids move with the other side",
-                check.wrong_side
-            );
-            let vertex = seen.wrong_side.first().copied();
-            self.add("wrong_side", shape, check.wrong_side as f64, vertex, text);
-            marked.extend(&seen.wrong_side);
-        }
-        if check.torn_edges as f64 > gates.torn_edges {
-            let text = format!("{shape} tears {} edges of the mesh", check.torn_edges);
-            let vertex = seen.torn.first().map(|edge| edge[0]);
-            self.add("torn_edges", shape, check.torn_edges as f64, vertex, text);
-            marked.extend(seen.torn.iter().flatten());
-        }
-        if let Some(leak) = check.leak_mm.filter(|leak| *leak > gates.leak_mm) {
-            let text = format!("{shape} moves the other side by {leak:.2} mm");
-            self.add("leak_mm", shape, leak, seen.leaking, text);
-            marked.extend(seen.leaking);
-        }
-        let percent = 100.0 * check.flipped as f64 / in_view.max(1) as f64;
-        if percent > gates.flipped_percent {
-            let text = format!(
-                "{shape} turns {} triangles over ({percent:.2} %)",
-                check.flipped
-            );
-            let vertex = seen.flipped.first().copied();
-            self.add("flipped_percent", shape, percent, vertex, text);
-            marked.extend(&seen.flipped);
-        }
-        for (what, crossed) in [("lips", &seen.lips), ("lids", &seen.lids)] {
-            if crossed.pairs > 0 && crossed.depth > gates.crossing_mm {
-                let text = format!(
-                    "{shape}: {what} stand {:.2} mm deep in each other ({} crossings): contact \
-                     keeps them apart (--contact sphincter)",
-                    crossed.depth, crossed.pairs
-                );
-                self.add("crossing_mm", shape, crossed.depth, crossed.vertex, text);
-                marked.extend(crossed.vertex);
-            }
-        }
-        marked.sort_unstable();
-        marked.dedup();
-        marked
-    }
-
-    fn of_muscles(&mut self, muscles: &[MuscleCheck]) {
-        for muscle in muscles {
-            if muscle.direction < self.gates.muscle_direction {
-                let text = format!(
-                    "{} runs against the template's (cosine {:.2})",
-                    muscle.name, muscle.direction
-                );
-                let (name, value) = (muscle.name.clone(), muscle.direction);
-                self.add("muscle_direction", &name, value, None, text);
-            }
-        }
-    }
-
-    fn of_distance(&mut self, face: &DistanceStatistics, of_vertex: &[Option<f64>]) {
-        if face.p95 <= self.gates.distance_mm {
-            return;
-        }
-        let pairs = of_vertex.iter().enumerate();
-        let farthest = pairs
-            .filter_map(|(v, d)| Some((v, (*d)?)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        self.found.push(Finding {
-            gate: "distance_mm",
-            shape: None,
-            value: face.p95,
-            limit: self.gates.distance_mm,
-            vertex: farthest.map(|(v, _)| v as u32),
-            text: format!(
-                "5 % of the face are {:.1} mm or more from the registered template: look at \
-                 `fabrig rig --report`, or give landmarks",
-                face.p95
-            ),
-        });
-    }
 }
