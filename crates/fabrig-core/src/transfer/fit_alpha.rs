@@ -10,8 +10,8 @@
 //! One amplitude a patch and shape solves the same for all shapes of a patch at once, drawn to
 //! the amplitude of the patch.
 //!
-//! What the jaw turns has amplitudes of its own: the angle of its hinge is fitted first, then how
-//! far each patch goes along, by the turn and straight; for all other shapes the turn is taken off.
+//! What the jaw turns is no matter of amplitude: the angle of its hinge is fitted first, and the
+//! turn taken off. Linear maps come with shares of the turn and of the straight displacement.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -140,7 +140,13 @@ pub fn fit_alphas(
     Amplitudes {
         by_patch,
         by_shape,
-        jaw: fit_jaw(hinge, jaw, patches, observations),
+        // Amplitudes leave the turn to the hinge: with them, neighbours that share it otherwise
+        // pull the chin too far.
+        jaw: if mode == AlphaMode::Map {
+            fit_jaw(hinge, jaw, patches, observations)
+        } else {
+            vec![TURN_ALONE; patches.len()]
+        },
     }
 }
 
