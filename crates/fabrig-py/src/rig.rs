@@ -9,7 +9,6 @@ use fabrig_core::evaluation::{CheckGates, GATES, check_rig};
 use fabrig_core::export::ExportOptions;
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::Scene;
-use fabrig_core::template;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -19,6 +18,7 @@ use crate::export::{Layout, shape_source};
 use crate::mesh::PyMesh;
 use crate::motion::PyClip;
 use crate::progress::Progress;
+use crate::template::template_of;
 
 /// A face that is ready to move.
 #[pyclass(frozen, name = "Rig", module = "fabrig")]
@@ -192,12 +192,14 @@ impl PyRig {
     /// that findings are about.
     ///
     /// - `gates`: limit by name, instead of the defaults
+    /// - `template`: folder of the template that the rig was made with, where that is your own
     /// - `progress`: called with ("check", share)
-    #[pyo3(signature = (*, gates=None, progress=None))]
+    #[pyo3(signature = (*, gates=None, template=None, progress=None))]
     fn check<'py>(
         &self,
         py: Python<'py>,
         gates: Option<BTreeMap<String, f64>>,
+        template: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut limits = CheckGates::default();
@@ -211,16 +213,13 @@ impl PyRig {
             }
         }
         let mut progress = Progress::new(progress);
+        let template = template_of(template)?;
         let count = self.inner.shape_names.len() as f64;
         let check = py.detach(|| {
             let scene = Scene::without_dynamics();
-            check_rig(
-                &self.inner,
-                template::human(),
-                &limits,
-                &scene,
-                &mut |shape| progress.report("check", shape as f64 / count),
-            )
+            check_rig(&self.inner, &template, &limits, &scene, &mut |shape| {
+                progress.report("check", shape as f64 / count)
+            })
         });
         progress.finish()?;
         let check = check.map_err(to_py)?;

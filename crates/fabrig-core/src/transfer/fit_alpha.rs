@@ -110,7 +110,7 @@ pub struct Observation {
 
 /// Fits the amplitudes of all patches.
 ///
-/// - `hinge`: with the angle of [`fit_open_angle`]
+/// - `hinge`: with the angle of [`fit_open_angle`](super::fit_open_angle)
 pub fn fit_alphas(
     hinge: &JawHinge,
     jaw: &JawShapes,

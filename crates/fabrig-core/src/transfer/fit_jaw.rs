@@ -122,7 +122,7 @@ pub(super) fn fit_jaw(
 /// `None` where the jaw does not move it.
 ///
 /// - `hinge`: with the angle of [`fit_open_angle`]
-/// - `shares`: of each node, smooth over the skin: [`Amplitudes::jaw`]
+/// - `shares`: of each node, smooth over the skin: [`Amplitudes::jaw`](super::Amplitudes::jaw)
 pub fn jaw_with_shares(
     patch: &PatchEvidence<'_>,
     hinge: &JawHinge,

@@ -127,6 +127,7 @@ class Rig:
         self,
         *,
         gates: Mapping[str, float] | None = None,
+        template: Path | None = None,
         progress: Progress | None = None,
     ) -> CheckReport: ...
 
