@@ -14,6 +14,7 @@
 use nalgebra::{DVector, SMatrix, SVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
 
+use super::RegistrationError;
 use super::closest_grid::{ClosestGrid, Sample, sample_surface};
 use super::face_model::FaceModel;
 use super::identity_fit::{Fitting, IdentityFit, fit_identity};
@@ -25,8 +26,8 @@ const CUTOFF_MM: f64 = 14.0;
 const ROLL_COUNT: usize = 24;
 const TILTS_DEGREES: [f64; 3] = [-28.0, 0.0, 28.0];
 /// Sizes tried: the diagonal of the mesh's box would be this long. (mm)
-const DIAGONALS_MM: [f64; 11] = [
-    210.0, 250.0, 300.0, 360.0, 430.0, 520.0, 620.0, 740.0, 900.0, 1150.0, 1500.0,
+const DIAGONALS_MM: [f64; 13] = [
+    210.0, 250.0, 300.0, 360.0, 430.0, 520.0, 620.0, 740.0, 900.0, 1150.0, 1500.0, 1900.0, 2400.0,
 ];
 const ANCHOR_COUNT: usize = 700;
 /// Samples that normals of anchors are averaged from, at most.
@@ -41,6 +42,7 @@ const FITTING: Fitting = Fitting {
     sigma: [4.0, 1.5],
     reach: [25.0, 14.0],
     has_own_normals: false,
+    thinned_share: 0.0,
 };
 /// What an unlikely person costs, for each squared standard deviation. (mm)
 const UNLIKELY_MM: f64 = 0.01;
@@ -60,12 +62,15 @@ pub(super) struct Alignment {
 /// Aligns triangles, wound counter-clockwise seen from outside, to the template.
 ///
 /// Returns `None` when no guess touches the mesh at all.
+///
+/// - `on_step`: told the share that is done; its error ends the search
 pub(super) fn align(
     model: &FaceModel<'_>,
     positions: &[Point],
     triangles: &[[u32; 3]],
     surface: &Surface,
-) -> Option<Alignment> {
+    on_step: &mut dyn FnMut(f64) -> Result<(), RegistrationError>,
+) -> Result<Option<Alignment>, RegistrationError> {
     let (mut low, mut high) = (
         positions[triangles[0][0] as usize],
         positions[triangles[0][0] as usize],
@@ -87,6 +92,7 @@ pub(super) fn align(
     );
     let nose = model.nose_tip();
 
+    on_step(0.15)?;
     let mut guesses: Vec<Guess> = anchors
         .par_iter()
         .map(|anchor| {
@@ -117,6 +123,7 @@ pub(super) fn align(
         .collect();
     guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
     guesses.truncate(SETTLED_COUNT);
+    on_step(0.5)?;
     let sparse = &points[..70.min(points.len())];
     guesses = guesses
         .par_iter()
@@ -125,6 +132,7 @@ pub(super) fn align(
     guesses.sort_by(|a, b| a.score.total_cmp(&b.score));
     let chosen = distinct(&guesses, REFINED_COUNT, 12.0, 15.0, 1.12);
 
+    on_step(0.7)?;
     let mut refined: Vec<Guess> = chosen
         .par_iter()
         .map(|g| refine(model, surface, grid.samples(), &points, &g.from_head, 14))
@@ -142,23 +150,26 @@ pub(super) fn align(
             .into_iter()
             .skip(6),
     );
+    on_step(0.85)?;
     let mut fitted: Vec<(Guess, DVector<f64>)> = finalists
         .par_iter()
         .map(|g| fit(model, surface, &spread, g))
         .collect();
     fitted.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
-    let (best, coefficients) = fitted.first()?.clone();
+    let Some((best, coefficients)) = fitted.first().cloned() else {
+        return Ok(None);
+    };
     let rival = fitted
         .iter()
         .filter(|(g, _)| differs(&best.from_head, &g.from_head, 45.0, 25.0, 1.35))
         .map(|(g, _)| g.score)
         .fold(CUTOFF_MM, f64::min);
-    Some(Alignment {
+    Ok(Some(Alignment {
         to_head: best.from_head.inverse(),
         coefficients,
         residual_mm: best.score,
         confidence: (1.0 - best.score / rival).clamp(0.0, 1.0),
-    })
+    }))
 }
 
 /// A place on the template, where it should go, the normal there, and trust; head frame.
@@ -434,15 +445,18 @@ fn fit(
         let normal = to_head.isometry.rotation * unit_normal(surface, at.triangle);
         Some((to_head.transform_point(&at.point), normal))
     };
-    let shaped = fit_identity(
+    let Ok(shaped) = fit_identity(
         model,
         spread,
         &closest,
-        &|_, _, _| Vec::new(),
+        &|_, _, _, _| Vec::new(),
         &[],
         &IdentityFit::template(),
         &FITTING,
-    );
+        &mut |_| Ok(()),
+    ) else {
+        return unshaped;
+    };
     let ratio = shaped.similarity.scaling();
     if !(0.6..1.6).contains(&ratio) {
         return unshaped;

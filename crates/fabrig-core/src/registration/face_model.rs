@@ -3,7 +3,6 @@
 
 use super::RegistrationError;
 use super::closest_grid::Sample;
-use super::openings::{Parting, find_partings};
 use crate::mesh::{Surface, Topology, triangle_normals, vertex_normals};
 use crate::template::{RegionId, Template};
 use crate::{Point, Vector};
@@ -88,8 +87,6 @@ pub(super) struct FaceModel<'a> {
     pub(super) normals: Vec<Vector>,
     pub(super) surface: Surface,
     pub(super) openings: Vec<Opening>,
-    /// Where one sees them part on the template itself.
-    pub(super) partings: Vec<Parting>,
     pub(super) triangle_roles: Vec<Role>,
     unit_triangle_normals: Vec<Vector>,
 }
@@ -133,7 +130,6 @@ impl<'a> FaceModel<'a> {
         Ok(Self {
             template,
             normals: vertex_normals(positions, &triangles),
-            partings: find_partings(&openings, &surface, positions),
             surface,
             unit_triangle_normals: triangle_normals(positions, &triangles)
                 .into_iter()

@@ -7,8 +7,9 @@
 //! E = sum_v w_v ( (n_v . (q_v - x_v))^2 + t |q_v - x_v|^2 ) / sigma^2 + |c|^2
 //! ```
 //!
-//! Places mostly bind along their normals: where along the surface a vertex belongs is left to
-//! what people are like. What sigma allows falls from round to round.
+//! Over the whole face q_v is the place most alike in place and in normal: the closest one says
+//! nothing of where along the surface a vertex belongs. What sigma allows falls from round to
+//! round.
 //!
 //! Source: Blanz & Vetter 1999, A Morphable Model for the Synthesis of 3D Faces; plane distances
 //! after Chen & Medioni 1992.
@@ -16,6 +17,7 @@
 use nalgebra::{DMatrix, DVector, Similarity3, Translation3, Unit, UnitQuaternion};
 use rayon::prelude::*;
 
+use super::RegistrationError;
 use super::face_model::{FaceModel, Role};
 use super::nonrigid_icp::Pin;
 use super::target::{Target, geman_mcclure, median_and_deviation};
@@ -27,7 +29,9 @@ const INDEPENDENT_COUNT: f64 = 40.0;
 /// A pin is worth this many.
 const PIN_COUNT: f64 = 3.0;
 /// Share of distances along the surface.
-const TANGENTIAL: f64 = 0.1;
+const TANGENTIAL: f64 = 1.0;
+/// One of so many places takes part in a thinned round, another one each round.
+const THINNED_STRIDE: usize = 4;
 /// Places whose equations are set up together.
 const BLOCK: usize = 48;
 
@@ -44,6 +48,8 @@ pub(super) struct Fitting {
     pub(super) reach: [f64; 2],
     /// Whether normals are those of the shape so far, or the template's own.
     pub(super) has_own_normals: bool,
+    /// Share of the rounds, from the first, in which a part of the places will do.
+    pub(super) thinned_share: f64,
 }
 
 /// Something to fit to, in the head frame: closest place to (point, normal) within a reach.
@@ -59,7 +65,9 @@ pub(super) struct Pulled {
 }
 
 /// What pulls on a shape with these vertices and normals, within a reach.
-pub(super) type Pulling<'a> = dyn Fn(&[Point], &[Vector], f64) -> Vec<Pulled> + 'a;
+/// Of its candidates those take part whose number passes.
+pub(super) type Pulling<'a> =
+    dyn Fn(&[Point], &[Vector], f64, &(dyn Fn(usize) -> bool + Sync)) -> Vec<Pulled> + 'a;
 
 /// A fitted shape.
 #[derive(Debug, Clone)]
@@ -99,9 +107,9 @@ impl IdentityFit {
 
 /// Fits the shape at `vertices` (weighted) to what `closest` finds.
 ///
-/// - `pulled`: further places found from the face's side, given the shape so far, its normals
-///   and how far to look; asked where [`Fitting::has_own_normals`]
+/// - `pulled`: further places found from the face's side; asked where [`Fitting::has_own_normals`]
 /// - `pins`: places that are known whatever is closest
+/// - `on_round`: told the share that is done; its error ends the fit
 pub(super) fn fit_identity(
     model: &FaceModel<'_>,
     vertices: &[(u32, f64)],
@@ -110,7 +118,8 @@ pub(super) fn fit_identity(
     pins: &[Pin],
     start: &IdentityFit,
     fitting: &Fitting,
-) -> IdentityFit {
+    on_round: &mut dyn FnMut(f64) -> Result<(), RegistrationError>,
+) -> Result<IdentityFit, RegistrationError> {
     let mode_count = fitting.mode_count.min(model.template.identity_modes.len());
     let mut fit = IdentityFit {
         similarity: start.similarity,
@@ -120,6 +129,7 @@ pub(super) fn fit_identity(
             .resize_vertically(mode_count, 0.0),
     };
     for round in 0..fitting.rounds {
+        on_round(round as f64 / fitting.rounds as f64)?;
         let share = round as f64 / (fitting.rounds.max(2) - 1) as f64;
         let between = |[a, b]: [f64; 2]| a * (b / a).powf(share);
         let (sigma, reach) = (between(fitting.sigma), between(fitting.reach));
@@ -128,9 +138,18 @@ pub(super) fn fit_identity(
             let normals = vertex_normals(&shape, &model.triangles);
             (shape, normals)
         });
+        // On the way, a part of the places each time.
+        let stride = if share < fitting.thinned_share {
+            THINNED_STRIDE
+        } else {
+            1
+        };
+        let takes_part = |k: usize| k % stride == round % stride;
         let mut places: Vec<Pulled> = vertices
             .par_iter()
-            .filter_map(|&(v, weight)| {
+            .enumerate()
+            .filter(|(k, _)| takes_part(*k))
+            .filter_map(|(_, &(v, weight))| {
                 let (at, n) = match &shape {
                     Some((shape, normals)) => (shape[v as usize], normals[v as usize]),
                     None => (
@@ -148,7 +167,7 @@ pub(super) fn fit_identity(
             })
             .collect();
         if let Some((shape, normals)) = &shape {
-            places.extend(pulled(shape, normals, reach));
+            places.extend(pulled(shape, normals, reach, &takes_part));
         }
         if places.len() < 30 {
             break;
@@ -198,7 +217,7 @@ pub(super) fn fit_identity(
             break;
         }
     }
-    fit
+    Ok(fit)
 }
 
 /// Where the corners' place is, by the whole shape where that is known.
@@ -352,11 +371,14 @@ fn tangents(normal: &Vector) -> [Vector; 2] {
 /// Rounds of the whole face; see [`shape_to`].
 const WHOLE: Fitting = Fitting {
     mode_count: usize::MAX,
-    rounds: 24,
-    sigma: [6.0, 0.3],
+    rounds: 60,
+    sigma: [6.0, 0.7],
     reach: [22.0, 8.0],
     has_own_normals: true,
+    thinned_share: 0.85,
 };
+/// What a difference of one between normals is worth. (mm)
+const NORMAL_MM: f64 = 15.0;
 /// Vertices of the face that pull on the shape, at most.
 const PULLING_COUNT: usize = 1500;
 
@@ -369,7 +391,8 @@ pub(super) fn shape_to(
     target: &Target,
     pins: &[Pin],
     likely: &DVector<f64>,
-) -> Vec<Point> {
+    on_round: &mut dyn FnMut(f64) -> Result<(), RegistrationError>,
+) -> Result<Vec<Point>, RegistrationError> {
     let areas = vertex_areas(model.positions(), &model.triangles);
     let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
     // Lips and lids have many small triangles and tell more than their area.
@@ -379,13 +402,19 @@ pub(super) fn shape_to(
         .collect();
     let closest = |p: &Point, n: &Vector, reach: f64| {
         let m = target.matching(p, n, reach, 0.5)?;
-        let normal = target.surface.blend(&m.place, &target.normals);
-        (!m.is_on_boundary).then_some((m.place.point, normal.try_normalize(0.0)?))
+        if m.is_on_boundary {
+            return None;
+        }
+        let (place, normal) = target.most_alike(p, n, m.place.triangle, NORMAL_MM);
+        Some((place, normal.try_normalize(0.0)?))
     };
-    let pulled = |shape: &[Point], normals: &[Vector], reach: f64| {
-        pulled_by(model, target, shape, normals, 0.5 * reach)
+    let pulled = |shape: &[Point],
+                  normals: &[Vector],
+                  reach: f64,
+                  takes_part: &(dyn Fn(usize) -> bool + Sync)| {
+        pulled_by(model, target, (shape, normals), 0.5 * reach, takes_part)
     };
-    fit_identity(
+    let fit = fit_identity(
         model,
         &vertices,
         &closest,
@@ -396,23 +425,29 @@ pub(super) fn shape_to(
             coefficients: likely.clone(),
         },
         &WHOLE,
-    )
-    .vertices(model)
+        on_round,
+    )?;
+    Ok(fit.vertices(model))
 }
 
 /// Vertices of the target with their closest places on the shape.
 fn pulled_by(
     model: &FaceModel<'_>,
     target: &Target,
-    shape: &[Point],
-    normals: &[Vector],
+    (shape, normals): (&[Point], &[Vector]),
     reach: f64,
+    takes_part: &(dyn Fn(usize) -> bool + Sync),
 ) -> Vec<Pulled> {
     let Ok(surface) = Surface::new(shape, &model.triangles) else {
         return Vec::new();
     };
     let stride = (target.positions.len() / PULLING_COUNT).max(1);
-    let all: Vec<usize> = (0..target.positions.len()).step_by(stride).collect();
+    let all: Vec<usize> = (0..target.positions.len())
+        .step_by(stride)
+        .enumerate()
+        .filter(|(k, _)| takes_part(*k))
+        .map(|(_, v)| v)
+        .collect();
     let found: Vec<Pulled> = all
         .par_iter()
         .filter_map(|&v| {
@@ -429,7 +464,11 @@ fn pulled_by(
         })
         .collect();
     // All together weigh half of what the template's own vertices do.
-    let own: f64 = model.face_vertices().count() as f64;
+    let own = model
+        .face_vertices()
+        .enumerate()
+        .filter(|(k, _)| takes_part(*k))
+        .count() as f64;
     let weight = 0.5 * own / found.len().max(1) as f64;
     found.into_iter().map(|p| Pulled { weight, ..p }).collect()
 }
@@ -452,31 +491,12 @@ mod tests {
             coefficients: DVector::from_fn(12, |k, _| if k % 2 == 0 { 0.5 } else { -0.35 }),
         };
         let places = truth.vertices(&model);
-        let surface = Surface::new(&places, &model.triangles).expect("surface");
-        let normals = crate::mesh::vertex_normals(&places, &model.triangles);
-        let vertices: Vec<(u32, f64)> = model.face_vertices().map(|v| (v, 1.0)).collect();
-        let fit = fit_identity(
-            &model,
-            &vertices,
-            &|p, n, reach| {
-                let at = surface
-                    .closest_where(p, reach, |at| surface.blend(at, &normals).dot(n) > 0.3)?;
-                Some((at.point, surface.blend(&at, &normals).normalize()))
-            },
-            &|_, _, _| Vec::new(),
-            &[],
-            &IdentityFit::template(),
-            &Fitting {
-                mode_count: 12,
-                rounds: 60,
-                sigma: [3.0, 0.3],
-                reach: [20.0, 6.0],
-                has_own_normals: true,
-            },
-        );
-        let mut off: Vec<f64> = vertices
-            .iter()
-            .map(|&(v, _)| (fit.vertex(&model, v as usize) - places[v as usize]).norm())
+        let target = Target::new(places.clone(), model.triangles.clone()).expect("target");
+        let found =
+            shape_to(&model, &target, &[], &DVector::zeros(0), &mut |_| Ok(())).expect("a fit");
+        let mut off: Vec<f64> = model
+            .face_vertices()
+            .map(|v| (found[v as usize] - places[v as usize]).norm())
             .collect();
         off.sort_by(f64::total_cmp);
         assert!(

@@ -73,7 +73,7 @@ pub(super) fn deform_coarse(
     graph: &NodeGraph,
     target: &Target,
     start: &[Point],
-    pins: &mut dyn FnMut(&[Point], bool) -> Vec<Pin>,
+    pins: &mut dyn FnMut(&[Point], bool) -> Result<Vec<Pin>, RegistrationError>,
     mut on_round: impl FnMut(f64) -> Result<(), RegistrationError>,
 ) -> Result<Vec<Point>, RegistrationError> {
     let rest: Vec<Point> = graph.nodes.iter().map(|&v| start[v as usize]).collect();
@@ -118,7 +118,7 @@ pub(super) fn deform_coarse(
                 let own = rest[node as usize];
                 attract(node, weight, &(own + n * n.dot(&(place - own))));
             }
-            for pin in pins(&vertices, round == 0) {
+            for pin in pins(&vertices, round == 0)? {
                 // A pin moves the nodes around it by as much as it lacks.
                 let lack = pin.place - pin.now(&vertices);
                 for (vertex, corner_share) in pin.corners {

@@ -6,8 +6,8 @@
 //! The path of most evidence across the columns is found by dynamic programming. This works
 //! alike for holes of the mesh, for mouths and sockets with an inside, and for fused scans.
 //!
-//! The template is probed in the same way once, so that what is matched is the same thing on
-//! both: the places where one sees lips and lids part.
+//! The template, as far as it has been deformed, is probed in the same way, so that what is
+//! matched is the same thing on both: the places where one sees lips and lids part.
 
 use super::face_model::{FaceModel, Opening, OpeningKind};
 use super::nonrigid_icp::Pin;
@@ -29,6 +29,9 @@ const JUMP_MM: f64 = 0.9;
 const VALLEY_ROWS: usize = 6;
 /// Evidence below this is noise. (mm)
 const MIN_EVIDENCE: f64 = 0.12;
+/// Pins of lids that are shut where those of the template are still open weigh this much more:
+/// no surface nearby tells how far they go.
+const SHUT_GAIN: f64 = 20.0;
 
 /// The parting of an opening.
 #[derive(Debug, Clone)]
@@ -270,12 +273,22 @@ fn edges(column: &Column, row: usize) -> Option<(Hit, Hit)> {
 
 /// Pins of the template's partings to those of the face, at equal fractions from corner to
 /// corner.
-pub(super) fn parting_pins(model: &FaceModel<'_>, found: &[Parting], weight: f64) -> Vec<Pin> {
+///
+/// - `own`: partings of the template as far as it has been deformed: under a heavy lid one sees
+///   other skin at the parting than on the template itself
+pub(super) fn parting_pins(
+    model: &FaceModel<'_>,
+    own: &[Parting],
+    found: &[Parting],
+    weight: f64,
+) -> Vec<Pin> {
     let mut pins = Vec::new();
     for face in found {
-        let Some(own) = model.partings.iter().find(|o| o.kind == face.kind) else {
+        let Some(own) = own.iter().find(|o| o.kind == face.kind) else {
             continue;
         };
+        let is_shut = face.kind != OpeningKind::Mouth && own.is_through && !face.is_through;
+        let weight = if is_shut { SHUT_GAIN * weight } else { weight };
         for column in &own.columns {
             let Some(mate) = face.columns.iter().find(|c| c.fraction == column.fraction) else {
                 continue;

@@ -38,6 +38,9 @@ const PIECE_SHARE: f64 = 0.2;
 /// Alignments worse than this are not trusted whatever their margin. (mm)
 const MAX_RESIDUAL_MM: f64 = 8.0;
 
+/// What a pin of a seam weighs.
+const SEAM_WEIGHT: f64 = 0.5;
+
 /// What to register by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegistrationOptions {
@@ -56,7 +59,7 @@ impl Default for RegistrationOptions {
         Self {
             landmarks: BTreeMap::new(),
             unit_mm: None,
-            min_confidence: 0.15,
+            min_confidence: 0.2,
         }
     }
 }
@@ -134,7 +137,9 @@ pub fn register(
     clock.finish("clean");
 
     clock.step("align", 0.05)?;
-    let start = align_face(&model, &mut cleaned, &landmarks, options)?;
+    let start = align_face(&model, &mut cleaned, &landmarks, options, &mut |share| {
+        clock.step("align", 0.05 + 0.3 * share)
+    })?;
     clock.finish("align");
 
     clock.step("shape", 0.35)?;
@@ -145,13 +150,14 @@ pub fn register(
     let shaped = shape_to(
         &model,
         &target,
-        &pins.at(&model, &[], 1.0),
+        &pins.landmarks(4.0),
         &start.coefficients,
-    );
+        &mut |share| clock.step("shape", 0.35 + 0.05 * share),
+    )?;
     clock.finish("shape");
 
     clock.step("deform", 0.4)?;
-    let mut partings: Vec<Parting> = Vec::new();
+    let mut seams = Vec::new();
     let coarse = deform_coarse(
         &model,
         &graph,
@@ -159,9 +165,9 @@ pub fn register(
         &shaped,
         &mut |vertices, is_first_of_stage| {
             if is_first_of_stage {
-                partings = find_partings(&model.openings, &target.surface, vertices);
+                seams = seam_pins(&model, &target, vertices)?;
             }
-            pins.at(&model, &partings, 1.0)
+            Ok([pins.landmarks(4.0), seams.clone()].concat())
         },
         |share| clock.step("deform", 0.4 + 0.25 * share),
     )?;
@@ -173,7 +179,7 @@ pub fn register(
         &model,
         &target,
         &coarse,
-        &pins.at(&model, &partings, 10.0),
+        &[pins.landmarks(40.0), seam_pins(&model, &target, &coarse)?].concat(),
         |share| clock.step("refine", 0.65 + 0.25 * share),
     )?;
     unfold(&model, &mut refined)?;
@@ -350,6 +356,7 @@ fn align_face(
     cleaned: &mut CleanMesh,
     landmarks: &MatchedLandmarks,
     options: &RegistrationOptions,
+    on_step: &mut dyn FnMut(f64) -> Result<(), RegistrationError>,
 ) -> Result<Start, RegistrationError> {
     let largest = cleaned.pieces[0].area;
     let mut candidates: Vec<usize> = (0..cleaned.pieces.len())
@@ -376,10 +383,17 @@ fn align_face(
 
     let start = if landmarks.names.is_empty() {
         let mut best: Option<Start> = None;
-        for &k in &candidates {
+        for (n, &k) in candidates.iter().enumerate() {
             let piece = &cleaned.pieces[k];
             let surface = Surface::new(&cleaned.positions, &piece.triangles)?;
-            let Some(found) = align(model, &cleaned.positions, &piece.triangles, &surface) else {
+            let found = align(
+                model,
+                &cleaned.positions,
+                &piece.triangles,
+                &surface,
+                &mut |share| on_step((n as f64 + share) / candidates.len() as f64),
+            )?;
+            let Some(found) = found else {
                 continue;
             };
             if best
@@ -474,7 +488,7 @@ fn target_of(
     Ok(Target::new(positions, triangles)?)
 }
 
-/// Landmarks and openings as pins.
+/// What the user says of single places.
 struct Pins {
     landmarks: Vec<(u32, Point)>,
 }
@@ -491,15 +505,28 @@ impl Pins {
         }
     }
 
-    fn at(&self, model: &FaceModel<'_>, partings: &[Parting], weight: f64) -> Vec<Pin> {
-        let mut pins: Vec<Pin> = self
-            .landmarks
+    fn landmarks(&self, weight: f64) -> Vec<Pin> {
+        self.landmarks
             .iter()
-            .map(|&(vertex, place)| Pin::of_vertex(vertex, place, 4.0 * weight))
-            .collect();
-        pins.extend(parting_pins(model, partings, weight));
-        pins
+            .map(|&(vertex, place)| Pin::of_vertex(vertex, place, weight))
+            .collect()
     }
+}
+
+/// Pins of lips and lids: where one sees them part on the deformed template to where one sees
+/// them part on the face.
+fn seam_pins(
+    model: &FaceModel<'_>,
+    target: &Target,
+    vertices: &[Point],
+) -> Result<Vec<Pin>, RegistrationError> {
+    let own = Surface::new(vertices, &model.triangles)?;
+    Ok(parting_pins(
+        model,
+        &find_partings(&model.openings, &own, vertices),
+        &find_partings(&model.openings, &target.surface, vertices),
+        SEAM_WEIGHT,
+    ))
 }
 
 /// From the frame of the first alignment to the head frame proper, turned and placed for the

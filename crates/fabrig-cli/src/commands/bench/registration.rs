@@ -99,6 +99,10 @@ fn summarize(console: &Console, results: &[CaseResult]) {
         "{passed} of {} cases pass, {refused} refused, {seconds:.1} s{memory}",
         results.len()
     ));
+    console.result(
+        "people come from the template's own source: the whole ones that they are made of are held \
+         out of its identity modes, local targets are shared",
+    );
 }
 
 /// The mesh of each case as `<name>.obj` and its truth as `<name>.truth.obj`: the template's
