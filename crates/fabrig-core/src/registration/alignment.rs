@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::RegistrationError;
 use super::closest_grid::{ClosestGrid, Sample, sample_surface};
 use super::face_model::FaceModel;
-use super::identity_fit::{Fitting, IdentityFit, fit_identity};
+use super::identity_fit::{Attraction, Fitting, IdentityFit, fit_identity};
 use crate::mesh::Surface;
 use crate::{Point, Vector};
 
@@ -447,10 +447,12 @@ fn fit(
     };
     let Ok(shaped) = fit_identity(
         model,
-        spread,
-        &closest,
-        &|_, _, _, _| Vec::new(),
-        &[],
+        &Attraction {
+            vertices: spread,
+            closest: &closest,
+            pulled: &|_, _, _, _| Vec::new(),
+            pins: &[],
+        },
         &IdentityFit::template(),
         &FITTING,
         &mut |_| Ok(()),

@@ -105,21 +105,34 @@ impl IdentityFit {
     }
 }
 
-/// Fits the shape at `vertices` (weighted) to what `closest` finds.
+/// What a shape is fitted to.
+pub(super) struct Attraction<'a> {
+    /// Vertices that look for a place, weighted.
+    pub(super) vertices: &'a [(u32, f64)],
+    /// What they find.
+    pub(super) closest: &'a Closest<'a>,
+    /// Further places found from the face's side; asked where [`Fitting::has_own_normals`].
+    pub(super) pulled: &'a Pulling<'a>,
+    /// Places that are known whatever is closest.
+    pub(super) pins: &'a [Pin],
+}
+
+/// Fits the shape to what attracts it, from `start`.
 ///
-/// - `pulled`: further places found from the face's side; asked where [`Fitting::has_own_normals`]
-/// - `pins`: places that are known whatever is closest
 /// - `on_round`: told the share that is done; its error ends the fit
 pub(super) fn fit_identity(
     model: &FaceModel<'_>,
-    vertices: &[(u32, f64)],
-    closest: &Closest<'_>,
-    pulled: &Pulling<'_>,
-    pins: &[Pin],
+    attraction: &Attraction<'_>,
     start: &IdentityFit,
     fitting: &Fitting,
     on_round: &mut dyn FnMut(f64) -> Result<(), RegistrationError>,
 ) -> Result<IdentityFit, RegistrationError> {
+    let Attraction {
+        vertices,
+        closest,
+        pulled,
+        pins,
+    } = attraction;
     let mode_count = fitting.mode_count.min(model.template.identity_modes.len());
     let mut fit = IdentityFit {
         similarity: start.similarity,
@@ -416,10 +429,12 @@ pub(super) fn shape_to(
     };
     let fit = fit_identity(
         model,
-        &vertices,
-        &closest,
-        &pulled,
-        pins,
+        &Attraction {
+            vertices: &vertices,
+            closest: &closest,
+            pulled: &pulled,
+            pins,
+        },
         &IdentityFit {
             similarity: Similarity3::identity(),
             coefficients: likely.clone(),

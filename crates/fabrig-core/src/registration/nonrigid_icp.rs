@@ -64,6 +64,9 @@ const ROUNDS_PER_STAGE: usize = 3;
 /// Matches within this distance are never outliers. (mm)
 const MIN_LIMIT_MM: f64 = 8.0;
 
+/// The pins at these positions of all vertices; the flag says whether a stage begins.
+pub(super) type PinsAt<'a> = dyn FnMut(&[Point], bool) -> Result<Vec<Pin>, RegistrationError> + 'a;
+
 /// Deforms the template onto the target; `pins` gives the pins for the current positions, and
 /// is told where a stage begins.
 ///
@@ -73,7 +76,7 @@ pub(super) fn deform_coarse(
     graph: &NodeGraph,
     target: &Target,
     start: &[Point],
-    pins: &mut dyn FnMut(&[Point], bool) -> Result<Vec<Pin>, RegistrationError>,
+    pins: &mut PinsAt<'_>,
     mut on_round: impl FnMut(f64) -> Result<(), RegistrationError>,
 ) -> Result<Vec<Point>, RegistrationError> {
     let rest: Vec<Point> = graph.nodes.iter().map(|&v| start[v as usize]).collect();
