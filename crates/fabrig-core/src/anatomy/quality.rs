@@ -15,9 +15,10 @@ const FOLDED: f64 = -0.5;
 
 /// Checks a grid laid on the template.
 ///
-/// Up to the standard resolution no quad may be folded. Of the quads that a finer grid has more,
-/// one in a hundred may: at the margins of lips and lids they are smaller than the skin's own
-/// facets, and two neighbours may lie on either side of a crease.
+/// Up to the standard resolution no quad may be folded but one in a hundred in the first row, at
+/// the margin of lips and lids, where a registered face has facets of any shape. Of the quads
+/// that a finer grid has more, one in a hundred may anywhere: there they are smaller than the
+/// skin's own facets, and two neighbours may lie on either side of a crease.
 ///
 /// # Errors
 ///
@@ -37,15 +38,36 @@ pub(super) fn check_grid(skin: &SkinFrame, patch: &Patch) -> Result<(), AnatomyE
             limit,
         });
     }
+    let quads = grid.quads().len();
+    let standard_count = Resolution::STANDARD.grid(patch.chart.kind).quads().len();
+    let mut tolerated = quads.saturating_sub(standard_count) / 100;
+    let mut tolerated_on_margin = quads / 100;
+    for [u, v] in folded_quads(skin, patch) {
+        let left = if v == 0 && tolerated == 0 {
+            &mut tolerated_on_margin
+        } else {
+            &mut tolerated
+        };
+        if *left == 0 {
+            return Err(AnatomyError::Folded {
+                patch: patch.chart.name.clone(),
+                u,
+                v,
+            });
+        }
+        *left -= 1;
+    }
+    Ok(())
+}
+
+/// Quads that face inwards, (u, v) of each.
+fn folded_quads(skin: &SkinFrame, patch: &Patch) -> Vec<[u32; 2]> {
     let sign = if patch.chart.side == Side::Right {
         -1.0
     } else {
         1.0
     };
-    let quads = grid.quads();
-    let standard_count = Resolution::STANDARD.grid(patch.chart.kind).quads().len();
-    let mut tolerated = quads.len().saturating_sub(standard_count) / 100;
-    for quad in quads {
+    let is_folded = |quad: &[u32; 4]| {
         let [a, b, c, d] = quad.map(|k| patch.neutral[k as usize]);
         let area = (c - a).cross(&(d - b)) * sign;
         // The two nodes further from the margin: on a margin the skin's normal tells little.
@@ -56,19 +78,14 @@ pub(super) fn check_grid(skin: &SkinFrame, patch: &Patch) -> Result<(), AnatomyE
                 skin.normal(node.triangle, node.barycentric)
             })
             .sum();
-        if area.dot(&outwards) < FOLDED * area.norm() * outwards.norm() {
-            if tolerated > 0 {
-                tolerated -= 1;
-                continue;
-            }
-            return Err(AnatomyError::Folded {
-                patch: patch.chart.name.clone(),
-                u: quad[0] % grid.u_count,
-                v: quad[0] / grid.u_count,
-            });
-        }
-    }
-    Ok(())
+        area.dot(&outwards) < FOLDED * area.norm() * outwards.norm()
+    };
+    let grid = patch.chart.grid;
+    let quads = grid.quads();
+    let folded = quads.into_iter().filter(is_folded);
+    folded
+        .map(|q| [q[0] % grid.u_count, q[0] / grid.u_count])
+        .collect()
 }
 
 /// Distances between neighbouring nodes of a grid. (mm)
@@ -117,5 +134,32 @@ impl Spacing {
         }
         spacing.mean /= f64::from(count.max(1));
         spacing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::chart::charts;
+    use crate::anatomy::lay::lay_patches;
+    use crate::template::human;
+
+    #[test]
+    fn nothing_of_the_bundled_template_is_folded_even_at_its_margins() {
+        let template = human();
+        let positions = template.skin.positions();
+        let skin = SkinFrame::new(positions, &template.skin.triangles()).expect("skin");
+        let charts = charts(template, Resolution::STANDARD).expect("charts");
+        let mut patches = lay_patches(template, &charts, positions).expect("patches");
+        for patch in &patches {
+            assert!(folded_quads(&skin, patch).is_empty());
+        }
+        // A node pulled over its neighbours folds what is around it.
+        let patch = &mut patches[0];
+        let grid = patch.chart.grid;
+        let [at, beyond] = [grid.index(5, 5), grid.index(9, 5)];
+        patch.neutral[at] = patch.neutral[beyond];
+        assert!(!folded_quads(&skin, patch).is_empty());
+        assert!(check_grid(&skin, patch).is_err());
     }
 }
