@@ -21,6 +21,7 @@ use fabrig_core::export::{
 };
 use fabrig_core::facs::ARKIT_SHAPES;
 use fabrig_core::mesh::CornerUvs;
+use fabrig_core::mesh::appearance::AppearanceError;
 use fabrig_core::mesh::io::{read_mesh, read_mesh_with_shapes, write_obj};
 use fabrig_core::motion::{Clip, parse_keys};
 use fabrig_core::pipeline::{AnimateOptions, animate, read_own_shapes};
@@ -438,6 +439,13 @@ fn materials_come_from_the_face_that_was_rigged() {
         .map(|m| m.pbr_metallic_roughness().base_color_factor())
         .collect();
     assert_eq!(colors, [[1.0; 4], [0.1, 0.2, 0.3, 1.0]]);
+    // A rig that keeps them needs no file any more, after it was saved and loaded either.
+    let mut keeping = Rig::clone(&rig);
+    let notes = keeping.keep_appearance(&at("face.obj")).unwrap();
+    assert!(notes.iter().any(|n| n.contains("missing.png")), "{notes:?}");
+    let keeping = Arc::new(Rig::from_bytes(&keeping.to_bytes().unwrap()).unwrap());
+    written(&keeping, &at("kept.glb"), &quick());
+    assert!(std::fs::read(at("kept.glb")).unwrap() == std::fs::read(at("a.glb")).unwrap());
     let usda = written(&rig, &at("a.usda"), &options);
     assert_eq!(usda.files, 2);
     let other = ExportOptions {
@@ -446,7 +454,13 @@ fn materials_come_from_the_face_that_was_rigged() {
     };
     std::fs::write(at("other.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let error = export(&rig, &at("b.glb"), &other, &mut |_| Continue(())).unwrap_err();
-    assert!(matches!(error, ExportError::OtherFace { .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            ExportError::Appearance(AppearanceError::OtherMesh { .. })
+        ),
+        "{error}"
+    );
     assert!(!at("b.glb").exists());
 }
 

@@ -15,6 +15,8 @@ use crate::errors::to_py;
 #[pyclass(frozen, name = "Mesh", module = "fabrig")]
 pub(crate) struct PyMesh {
     pub(crate) inner: Mesh,
+    /// The file that it was read from: a rig of it keeps its materials and pictures.
+    pub(crate) source: Option<PathBuf>,
 }
 
 #[pymethods]
@@ -26,7 +28,10 @@ impl PyMesh {
         let positions = arrays::points("vertices", vertices)?;
         let polygons = arrays::polygons("faces", faces)?;
         let inner = Mesh::new(positions, polygons).map_err(to_py)?;
-        Ok(Self { inner })
+        Ok(Self {
+            inner,
+            source: None,
+        })
     }
 
     /// Vertices, shape (N, 3).
@@ -64,8 +69,11 @@ impl PyMesh {
 /// Reads an OBJ, PLY, STL or glTF file.
 #[pyfunction]
 pub(crate) fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<PyMesh> {
-    let inner = py.detach(|| io::read_mesh(path)).map_err(to_py)?;
-    Ok(PyMesh { inner })
+    let inner = py.detach(|| io::read_mesh(&path)).map_err(to_py)?;
+    Ok(PyMesh {
+        inner,
+        source: Some(path),
+    })
 }
 
 /// The shapes that a mesh file holds beside its mesh (morph targets of glTF), by name: the
@@ -91,5 +99,6 @@ pub(crate) fn read_shapes<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound
 pub(crate) fn demo_face() -> PyMesh {
     PyMesh {
         inner: template::demo_face(),
+        source: None,
     }
 }

@@ -25,7 +25,8 @@ use crate::template::template_of;
 /// Makes the rig of a neutral face.
 ///
 /// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists;
-///   or a `Mesh` alone, which keeps its texture coordinates and groups
+///   or a `Mesh` alone, which keeps its texture coordinates and groups, and one that was
+///   read from a file its materials and pictures
 /// - `landmarks`: name -> (x, y, z) in the mesh's own units
 /// - `unit_mm`: millimetres per unit, where it is known
 /// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
@@ -56,8 +57,12 @@ pub(crate) fn rig(
     template: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
+    let mut options = RigFaceOptions::default();
     let face = match (vertices.cast::<PyMesh>(), faces) {
-        (Ok(mesh), None) => mesh.get().inner.clone(),
+        (Ok(mesh), None) => {
+            options.source.clone_from(&mesh.get().source);
+            mesh.get().inner.clone()
+        }
         (Ok(_), Some(_)) => return Err(input("faces: the mesh given has its own")),
         (Err(_), None) => return Err(input("faces: needed beside an array of vertices")),
         (Err(_), Some(faces)) => {
@@ -66,7 +71,6 @@ pub(crate) fn rig(
             Mesh::new(positions, polygons).map_err(to_py)?
         }
     };
-    let mut options = RigFaceOptions::default();
     options.registration.unit_mm = unit_mm;
     for name in cut_seams.unwrap_or_default() {
         match name.as_str() {

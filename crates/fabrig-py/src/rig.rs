@@ -125,6 +125,7 @@ impl PyRig {
     fn mesh(&self) -> PyMesh {
         PyMesh {
             inner: self.inner.face.clone(),
+            source: None,
         }
     }
 

@@ -29,6 +29,7 @@ impl PyTemplate {
     fn mesh(&self) -> PyMesh {
         PyMesh {
             inner: template::human().skin.clone(),
+            source: None,
         }
     }
 

@@ -208,8 +208,8 @@ def test_a_mesh_is_rigged_as_it_is_and_the_guide_s_example_runs(face, monkeypatc
     face.write_obj("face.obj")
     code = re.search(r"```python\n(.*?)```", GUIDE.read_text(), re.S).group(1)
     # The same, quicker: shapes that settle are tested in the core.
-    assert 'face="face.obj",' in code
-    code = code.replace('face="face.obj",', 'face="face.obj", shapes="targets",')
+    assert '"face.glb",' in code
+    code = code.replace('"face.glb",', '"face.glb", shapes="targets",')
     names = {}
     exec(compile(code, "export.md", "exec"), names)
     assert names["report"]["linear"]["rms_mm"] < 2
@@ -244,10 +244,10 @@ def test_khronos_validator_finds_nothing(rig, face, take, tmp_path):
     (tmp_path / "face.mtl").write_text("newmtl skin\nd 0.9\nmap_Kd skin.png\n")
     (tmp_path / "skin.png").write_bytes(PNG)
     textured = fabrig.rig(fabrig.read_mesh(tmp_path / "face.obj"))
-    textured.export(tmp_path / "uv.glb", face=tmp_path / "face.obj", **options)
+    textured.export(tmp_path / "uv.glb", **options)
     # Its triangles are split at the seams of every other polygon; its materials are found again.
     again = fabrig.rig(fabrig.read_mesh(tmp_path / "uv.glb"))
-    report = again.export(tmp_path / "again.glb", face=tmp_path / "uv.glb", **options)
+    report = again.export(tmp_path / "again.glb", **options)
     assert report["materials"] == ["skin"] and not report["notes"]
     files = sorted(tmp_path.glob("*.gl*"))
     assert len(files) == 5

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use fabrig_core::mesh::Mesh;
+use fabrig_core::mesh::appearance::Appearance;
 use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::motion::{self, Clip, ReadOptions};
 use fabrig_core::recording::RecordingReader;
@@ -71,6 +72,12 @@ fn rig_facts(rig: &Rig) -> Value {
     let nodes: usize = rig.patches.iter().map(|p| p.patch.neutral.len()).sum();
     let shapes: usize = rig.patches.iter().map(|p| p.transfer.shapes.len()).sum();
     let parts: Vec<&str> = rig.parts.iter().map(|p| p.name.as_str()).collect();
+    let look = rig.appearance.as_ref();
+    let pictures: Vec<Value> = look.map_or_else(Vec::new, |look| {
+        let list = look.pictures.iter();
+        list.map(|p| json!({"name": p.name, "type": p.mime, "bytes": p.bytes.len()}))
+            .collect()
+    });
     json!({
         "kind": "rig",
         "template": rig.template,
@@ -82,6 +89,9 @@ fn rig_facts(rig: &Rig) -> Value {
         "muscle_shapes": shapes,
         "shapes": rig.shape_names.len(),
         "parts": parts,
+        "has_uvs": rig.face.uvs().is_some(),
+        "materials": look.map_or_else(Vec::new, Appearance::names),
+        "pictures": pictures,
     })
 }
 

@@ -19,7 +19,10 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
     {
         check_output(path)?;
     }
-    let mut options = RigFaceOptions::default();
+    let mut options = RigFaceOptions {
+        source: Some(args.face.clone()),
+        ..RigFaceOptions::default()
+    };
     options.registration.unit_mm = args.unit.map(crate::cli::Unit::millimetres);
     if let Some(path) = &args.landmarks {
         let order = args.landmarks_order.map(|order| match order {
@@ -192,6 +195,18 @@ pub(super) fn print_report(console: &Console, rigged: &RiggedFace) {
         ),
     );
     line("patches", format!("{} with {nodes} nodes", patches.len()));
+    if let Some(look) = &rigged.rig.appearance {
+        let bytes: usize = look.pictures.iter().map(|p| p.bytes.len()).sum();
+        line(
+            "materials",
+            format!(
+                "{}; {} pictures, {:.1} MB",
+                look.names().join(", "),
+                look.pictures.len(),
+                bytes as f64 / 1e6
+            ),
+        );
+    }
     let stages: Vec<String> = report
         .times
         .iter()

@@ -7,10 +7,10 @@ use std::time::Instant;
 use nalgebra::Similarity3;
 
 use super::face::{ExportFace, Frame, Placement};
-use super::materials;
+use super::look;
 use super::run::OnProgress;
 use super::take::FrameSource;
-use super::writer::{Notes, Writer};
+use super::writer::Writer;
 use super::{ExportError, ExportFormat, ExportOptions, ExportReport, LengthUnit};
 use crate::mesh::{Mesh, Polygons};
 use crate::recording::{RecordedFrame, RecordingReader};
@@ -60,7 +60,7 @@ pub fn convert(
         });
     }
     let last = times[times.len() - 1].0;
-    let mut notes = Notes::default();
+    let mut notes = Vec::new();
     let fps = (times.len() - 1) as f64 / (last - first);
     let mut reader = RecordedFrames {
         reader: RecordingReader::open(recording)?,
@@ -81,25 +81,18 @@ pub fn convert(
             }
             reader.placement = Placement::new(rig.to_head, unit);
             reader.rest = rig.skin_at_rest().iter().map(|p| p.cast()).collect();
-            let (materials, of_polygon) = match &options.export.source {
-                Some(source) => materials::of_source(source, &rig.face, &mut notes)?,
-                None => Default::default(),
-            };
-            let (materials, of_polygon) = if materials.list.is_empty() {
-                materials::of_parts(rig)
-            } else {
-                (materials, of_polygon)
-            };
+            let source = options.export.source.as_deref();
+            let appearance = look::appearance(rig, source, &mut notes)?;
             let name = &options.export.name;
-            ExportFace::new(name, &rig.face, reader.placement, materials, &of_polygon)
+            ExportFace::new(name, &rig.face, reader.placement, appearance)
         }
         None => {
             let frame = first_frame(recording)?;
             let (mesh, surfaces, of_polygon) = mesh_of(&frame, recording)?;
             reader.rest = mesh.positions().to_vec();
-            let materials = materials::of_surfaces(&surfaces);
+            let appearance = look::of_surfaces(&surfaces, of_polygon);
             let name = &options.export.name;
-            ExportFace::new(name, &mesh, reader.placement, materials, &of_polygon)
+            ExportFace::new(name, &mesh, reader.placement, appearance)
         }
     };
     let mut writer = Writer::new(output, format, &face, notes);

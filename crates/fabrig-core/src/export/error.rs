@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::mesh::MeshError;
+use crate::mesh::appearance::AppearanceError;
 use crate::mesh::io::MeshIoError;
 use crate::recording::RecordingError;
 use crate::scene::SceneError;
@@ -53,30 +54,9 @@ pub enum ExportError {
         /// Name of the format.
         format: &'static str,
     },
-    /// The mesh that materials should come from is another one than the rig's.
-    #[error(
-        "{}: {what} of the rig's face and this file differ ({expected} and {found}): give the very \
-         mesh that the rig was made from",
-        path.display()
-    )]
-    OtherFace {
-        /// The file.
-        path: PathBuf,
-        /// What differs.
-        what: &'static str,
-        /// The rig's.
-        expected: usize,
-        /// The file's.
-        found: usize,
-    },
-    /// The materials of the source mesh cannot be read.
-    #[error("the materials of {} cannot be read: {reason}", path.display())]
-    Materials {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
+    /// The materials of the source mesh cannot be read, or belong to another mesh.
+    #[error(transparent)]
+    Appearance(#[from] AppearanceError),
     /// A frame rate or a number of components that cannot be.
     #[error("{name} must be {expected}, got {found}")]
     Option {
@@ -114,7 +94,7 @@ pub enum ExportError {
     /// The rig does not fit its scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A mesh that materials or expressions come from cannot be read, or one not written.
+    /// A mesh cannot be written.
     #[error(transparent)]
     MeshIo(#[from] MeshIoError),
     /// Vertices came out that are not numbers.

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
 use super::LengthUnit;
-use super::materials::Materials;
+use crate::mesh::appearance::Appearance;
 use crate::mesh::{CornerUvs, Mesh, Polygons, vertex_normals};
 use crate::{Point, Vector};
 
@@ -78,7 +78,7 @@ impl Placement {
 pub(super) struct Section {
     /// Name of the material.
     pub(super) name: String,
-    /// Its index in [`Materials::list`].
+    /// Its index in [`Appearance::materials`].
     pub(super) material: usize,
     /// Polygons of the face, rising.
     pub(super) polygons: Vec<u32>,
@@ -94,21 +94,19 @@ pub(super) struct ExportFace {
     pub(super) polygons: Polygons,
     pub(super) uvs: Option<CornerUvs>,
     pub(super) sections: Vec<Section>,
-    pub(super) materials: Materials,
+    pub(super) appearance: Appearance,
     triangles: Vec<[u32; 3]>,
 }
 
 impl ExportFace {
-    /// - `materials`: with the material of each polygon of the mesh
     pub(super) fn new(
         name: &str,
         mesh: &Mesh,
         placement: Placement,
-        materials: Materials,
-        material_of: &[u32],
+        appearance: Appearance,
     ) -> Self {
-        let mut sections: Vec<Section> = materials
-            .list
+        let mut sections: Vec<Section> = appearance
+            .materials
             .iter()
             .enumerate()
             .map(|(material, of)| Section {
@@ -117,7 +115,7 @@ impl ExportFace {
                 polygons: Vec::new(),
             })
             .collect();
-        for (polygon, &material) in (0u32..).zip(material_of) {
+        for (polygon, &material) in (0u32..).zip(&appearance.of_polygon) {
             sections[material as usize].polygons.push(polygon);
         }
         sections.retain(|section| !section.polygons.is_empty());
@@ -132,7 +130,7 @@ impl ExportFace {
             polygons: mesh.polygons().clone(),
             uvs: mesh.uvs().cloned(),
             sections,
-            materials,
+            appearance,
             triangles: mesh.triangles(),
         }
     }

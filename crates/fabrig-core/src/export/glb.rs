@@ -16,6 +16,7 @@ use super::face::{ExportFace, Shape, WeightAnimation, single};
 use super::gltf_buffer::{BufferBuilder, Target};
 use super::seams::SplitVertices;
 use crate::atomic_file::write_atomically;
+use crate::mesh::appearance::Appearance;
 use crate::{Point, Vector};
 
 /// Changes of normals below this are left out.
@@ -167,8 +168,38 @@ fn document(
     root.insert("scenes".to_owned(), json!([{"nodes": [0]}]));
     root.insert("nodes".to_owned(), json!([{"name": face.name, "mesh": 0}]));
     root.insert("meshes".to_owned(), json!([mesh]));
-    face.materials.write_gltf(&mut root, buffer);
+    write_materials(&face.appearance, &mut root, buffer);
     root
+}
+
+/// Adds materials, their pictures and how those are sampled.
+fn write_materials(
+    appearance: &Appearance,
+    root: &mut Map<String, Value>,
+    buffer: &mut BufferBuilder,
+) {
+    let materials: Vec<&Value> = appearance.materials.iter().map(|m| &m.gltf).collect();
+    root.insert("materials".to_owned(), json!(materials));
+    let images: Vec<Value> = appearance
+        .pictures
+        .iter()
+        .map(|picture| {
+            let view = buffer.view(&picture.bytes, Target::Other);
+            json!({"name": picture.name, "mimeType": picture.mime, "bufferView": view})
+        })
+        .collect();
+    for (name, list) in [
+        ("textures", appearance.textures.clone()),
+        ("samplers", appearance.samplers.clone()),
+        ("images", images),
+    ] {
+        if !list.is_empty() {
+            root.insert(name.to_owned(), Value::Array(list));
+        }
+    }
+    if !appearance.extensions.is_empty() {
+        root.insert("extensionsUsed".to_owned(), json!(appearance.extensions));
+    }
 }
 
 /// Offsets of the vertices and of their normals.

@@ -12,7 +12,7 @@ mod face;
 mod format;
 mod glb;
 mod gltf_buffer;
-mod materials;
+mod look;
 mod npz;
 mod obj_folder;
 mod options;

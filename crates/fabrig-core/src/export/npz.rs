@@ -137,7 +137,7 @@ pub(super) fn write_face(npz: &mut NpzWriter<impl Write>, face: &ExportFace) -> 
             Elements::U32(&uvs.corners),
         )?;
     }
-    let names = face.materials.names();
+    let names = face.appearance.names();
     npz.array("materials", &[names.len()], Elements::Text(&names))?;
     let mut materials = vec![0; counts.len()];
     for section in &face.sections {

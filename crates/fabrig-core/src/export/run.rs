@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::face::{ExportFace, Placement, Shape};
-use super::materials;
+use super::look;
 use super::shapes::morph_targets;
 use super::take::{SimulatedTake, linear_error, rate, weights_of_take};
-use super::writer::{Notes, Writer};
+use super::writer::Writer;
 use super::{ExportError, ExportFormat, ExportOptions, ExportReport, LengthUnit};
 use crate::motion::{Clip, parse_keys};
 use crate::registration::Progress;
@@ -47,17 +47,9 @@ pub fn export(
         _ => LengthUnit::Own,
     });
     let placement = Placement::new(rig.to_head, unit);
-    let mut notes = Notes::default();
-    let (materials, of_polygon) = match &options.source {
-        Some(source) => materials::of_source(source, &rig.face, &mut notes)?,
-        None => Default::default(),
-    };
-    let (materials, of_polygon) = if materials.list.is_empty() {
-        materials::of_parts(rig)
-    } else {
-        (materials, of_polygon)
-    };
-    let face = ExportFace::new(&options.name, &rig.face, placement, materials, &of_polygon);
+    let mut notes = Vec::new();
+    let appearance = look::appearance(rig, options.source.as_deref(), &mut notes)?;
+    let face = ExportFace::new(&options.name, &rig.face, placement, appearance);
     // Points alone, or as many OBJ files as there are frames: always simulated.
     let is_baked = options.baked
         || format.is_point_cache()

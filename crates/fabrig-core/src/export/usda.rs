@@ -223,7 +223,7 @@ fn begin_mesh(
     }
     match &face.sections[..] {
         [only] => {
-            let names = prim_names(face.materials.list.iter().map(|m| m.name.as_str()));
+            let names = prim_names(face.appearance.materials.iter().map(|m| m.name.as_str()));
             let name = &names[only.material];
             writeln!(
                 out,
@@ -240,7 +240,7 @@ fn begin_mesh(
 
 fn end_mesh(out: &mut dyn Write, face: &ExportFace, root: &str) -> io::Result<()> {
     if face.sections.len() > 1 {
-        let materials = prim_names(face.materials.list.iter().map(|m| m.name.as_str()));
+        let materials = prim_names(face.appearance.materials.iter().map(|m| m.name.as_str()));
         // Beside the blend shapes, whose names they must not take.
         for section in &face.sections {
             let name = &materials[section.material];
@@ -261,7 +261,7 @@ fn end_mesh(out: &mut dyn Write, face: &ExportFace, root: &str) -> io::Result<()
 
 fn write_materials(out: &mut dyn Write, face: &ExportFace, pictures: &[String]) -> io::Result<()> {
     let root = &prim_names([face.name.as_str()])[0];
-    let materials = &face.materials.list;
+    let materials = &face.appearance.materials;
     let names = prim_names(materials.iter().map(|m| m.name.as_str()));
     writeln!(out, "    def Scope \"Materials\"\n    {{")?;
     for (material, name) in materials.iter().zip(&names) {
@@ -323,7 +323,7 @@ pub(super) fn write_pictures(
     face: &ExportFace,
 ) -> Result<(Vec<String>, u64), ExportError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let pictures = &face.materials.pictures;
+    let pictures = &face.appearance.pictures;
     let plain = prim_names(pictures.iter().map(|p| p.name.as_str()));
     let mut names = Vec::new();
     let mut bytes = 0;

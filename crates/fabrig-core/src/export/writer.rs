@@ -15,20 +15,6 @@ use super::{
 use crate::atomic_file::write_atomically;
 use crate::registration::Progress;
 
-/// What a person should know of an export.
-#[derive(Debug, Default)]
-pub(super) struct Notes(Vec<String>);
-
-impl Notes {
-    pub(super) fn add(&mut self, note: String) {
-        self.0.push(note);
-    }
-
-    pub(super) fn into_inner(self) -> Vec<String> {
-        self.0
-    }
-}
-
 /// An error inside a file that is being written: of the file or of what goes into it.
 enum Inside {
     Io(io::Error),
@@ -64,7 +50,7 @@ impl Inside {
 pub(super) struct Writer<'a> {
     path: &'a Path,
     face: &'a ExportFace,
-    notes: Notes,
+    notes: Vec<String>,
     pub(super) report: ExportReport,
 }
 
@@ -73,7 +59,7 @@ impl<'a> Writer<'a> {
         path: &'a Path,
         format: ExportFormat,
         face: &'a ExportFace,
-        notes: Notes,
+        notes: Vec<String>,
     ) -> Self {
         let vertices = face.positions.len();
         Self {
@@ -103,7 +89,7 @@ impl<'a> Writer<'a> {
     }
 
     pub(super) fn finish(mut self) -> ExportReport {
-        self.report.notes = self.notes.into_inner();
+        self.report.notes = self.notes;
         self.report
     }
 

@@ -1,5 +1,6 @@
 //! Polygon meshes: storage with validated topology, derived geometry, files.
 
+pub mod appearance;
 mod components;
 pub mod io;
 mod laplacian;

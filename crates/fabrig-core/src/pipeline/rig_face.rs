@@ -1,6 +1,7 @@
 //! From a mesh to a rig.
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::Error;
@@ -22,6 +23,8 @@ pub struct RigFaceOptions {
     pub rig: RigOptions,
     /// Expressions of this very face, to which amplitudes are fitted.
     pub expressions: Vec<Expression>,
+    /// The file that the face came from: the rig keeps its materials and pictures.
+    pub source: Option<PathBuf>,
     /// The mesh at rest that the expressions are on, where it is another mesh of the same face;
     /// it is registered by itself.
     pub expressions_on: Option<Mesh>,
@@ -116,6 +119,9 @@ pub fn rig_face(
     let mut rig = build(&on_template, template, &options.rig)?;
     name_parts_by_groups(&mut rig);
     let mut report = registration.report;
+    if let Some(file) = &options.source {
+        report.warnings.extend(rig.keep_appearance(file)?);
+    }
     for shape in rig.dead_shapes() {
         report.warnings.push(match shape {
             "tongueOut" => "the mesh has no tongue: tongueOut moves nothing".to_owned(),

@@ -196,6 +196,7 @@ pub fn build(
         regions: skin_regions(template, &skin_places),
         materials: template.materials.clone(),
         registration_report: report.clone(),
+        appearance: None,
     };
     close_lids(&mut rig, template);
     Ok(rig)

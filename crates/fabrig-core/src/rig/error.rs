@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use crate::anatomy::AnatomyError;
+use crate::mesh::appearance::AppearanceError;
 use crate::skin::SkinError;
 use crate::transfer::TransferError;
 
@@ -49,11 +50,13 @@ pub enum RigError {
     NotARig,
     /// The file is of a version that this build does not read.
     #[error(
-        "the rig file is of format version {found}, this build reads {expected}; make it again \
-         with `fabrig rig`"
+        "the rig file is of format version {found}, this build reads {oldest} to {expected}; make \
+         it again with `fabrig rig`"
     )]
     Version {
-        /// What this build reads.
+        /// The oldest that this build reads.
+        oldest: u32,
+        /// The newest that this build reads, and the one it writes.
         expected: u32,
         /// What the file says.
         found: u32,
@@ -76,6 +79,9 @@ pub enum RigError {
         /// What the content gives.
         found: u32,
     },
+    /// Materials could not be read, or those in the file do not hold together.
+    #[error(transparent)]
+    Appearance(#[from] AppearanceError),
     /// The content cannot be decoded although its checksum is right.
     #[error("the rig file cannot be decoded: {reason}")]
     Content {

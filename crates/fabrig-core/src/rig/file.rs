@@ -8,19 +8,25 @@
 //! 24  .  zstd of the rig in postcard encoding
 //! ```
 //!
-//! Equal rigs give equal bytes.
+//! Equal rigs give equal bytes. Version 4 added the materials and pictures of the face, at the
+//! end; version 3 is read as a face without.
 
 use std::path::Path;
 
 use crate::atomic_file::write_atomically;
 use crate::rig::{Rig, RigError};
 
-/// Version of the format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 3;
+/// Version of the format that this build writes.
+pub const FORMAT_VERSION: u32 = 4;
+/// Oldest version that this build reads: it ends before the appearance, and reads as a face
+/// without one.
+pub const OLDEST_VERSION: u32 = 3;
 
 const MARK: &[u8; 8] = b"FABRIG\r\n";
 const HEADER_LENGTH: usize = 24;
 const COMPRESSION_LEVEL: i32 = 9;
+/// Postcard's `None`.
+const NO_APPEARANCE: u8 = 0;
 /// No honest rig decompresses to more. (bytes)
 const LARGEST_CONTENT: usize = 4 << 30;
 
@@ -59,8 +65,9 @@ impl Rig {
             });
         };
         let version = u32::from_le_bytes(array(header, 8));
-        if version != FORMAT_VERSION {
+        if !(OLDEST_VERSION..=FORMAT_VERSION).contains(&version) {
             return Err(RigError::Version {
+                oldest: OLDEST_VERSION,
                 expected: FORMAT_VERSION,
                 found: version,
             });
@@ -83,8 +90,15 @@ impl Rig {
             .and_then(|size| usize::try_from(size).ok())
             .filter(|&size| size <= LARGEST_CONTENT)
             .ok_or_else(|| content("the compressed part does not say how large it is"))?;
-        let plain = zstd::bulk::decompress(packed, capacity).map_err(content)?;
-        postcard::from_bytes(&plain).map_err(content)
+        let mut plain = zstd::bulk::decompress(packed, capacity).map_err(content)?;
+        if version < FORMAT_VERSION {
+            plain.push(NO_APPEARANCE);
+        }
+        let rig: Self = postcard::from_bytes(&plain).map_err(content)?;
+        if let Some(appearance) = &rig.appearance {
+            appearance.check(rig.face.face_count())?;
+        }
+        Ok(rig)
     }
 
     /// Writes the rig to a file; what stood there stays until the new file is whole.

@@ -17,10 +17,12 @@ mod tongue;
 pub use assemble::{FaceOnTemplate, RigOptions, build, places_of_self, rig_of_template};
 pub use error::RigError;
 pub use expressions::{Expression, carry_expressions};
-pub use file::FORMAT_VERSION;
+pub use file::{FORMAT_VERSION, OLDEST_VERSION};
 pub use parts::RigPart;
 pub use template_side::{fit_template_weights, stored_template_weights, write_template_weights};
 pub use tongue::PartShape;
+
+use std::path::Path;
 
 use nalgebra::{Point3, Similarity3, Vector3};
 use rayon::prelude::*;
@@ -29,6 +31,7 @@ use serde::{Deserialize, Serialize};
 use crate::Point;
 use crate::anatomy::{GridShape, Patch};
 use crate::mesh::Mesh;
+use crate::mesh::appearance::Appearance;
 use crate::skin::{NodeAffine, SkinBinding};
 use crate::template::{EyeSocket, JawHinge, RegionId};
 use crate::transfer::{
@@ -96,9 +99,30 @@ pub struct Rig {
     pub materials: String,
     /// What registration reported about this face, as JSON; empty where there was none.
     pub registration_report: String,
+    /// Materials and pictures of the face; none where the mesh came without.
+    ///
+    /// Last, so that files of the version before read as faces without.
+    pub appearance: Option<Appearance>,
 }
 
 impl Rig {
+    /// Keeps the materials and pictures of the file that the face came from; returns what a
+    /// person should know, such as a picture that is not there.
+    ///
+    /// # Errors
+    ///
+    /// [`RigError::Appearance`]: the file cannot be read, or holds another mesh.
+    pub fn keep_appearance(&mut self, file: &Path) -> Result<Vec<String>, RigError> {
+        let mut notes = Vec::new();
+        let appearance = Appearance::of_file(file, &self.face, &mut notes)?;
+        if appearance.is_empty() {
+            // Then there is nothing to know but that.
+            notes.clear();
+        }
+        self.appearance = (!appearance.is_empty()).then_some(appearance);
+        Ok(notes)
+    }
+
     /// Index of a shape in lists of weights.
     pub fn shape_index(&self, name: &str) -> Option<usize> {
         self.shape_names.iter().position(|n| n == name)

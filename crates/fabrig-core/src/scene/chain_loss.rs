@@ -67,8 +67,11 @@ pub struct ShapeLoss {
 
 /// Step with which a pose is held. (s)
 const HOLD_STEP: f64 = 1.0 / 60.0;
-/// A face holds still once no skin vertex moves this much in a step. (mm)
-const STILL: f32 = 2e-4;
+/// Steps from one look at the skin to the next: what creeps shows over several.
+const STEPS_BETWEEN_LOOKS: usize = 8;
+/// A face holds still once no skin vertex moved this much since the last look: single precision
+/// makes cloth that has come to rest tremble by half of it. (mm)
+const STILL: f32 = 4e-3;
 /// Steps after which a face is taken as it is.
 const LONGEST_HOLD: usize = 240;
 
@@ -80,8 +83,10 @@ const LONGEST_HOLD: usize = 240;
 pub fn hold_pose(simulation: &mut Simulation, pose: &FacePose) -> Result<(), SceneError> {
     simulation.reset(pose.clone())?;
     let mut before = simulation.skin().to_vec();
-    for _ in 0..LONGEST_HOLD {
-        simulation.advance_to(pose.clone(), HOLD_STEP)?;
+    for _ in 0..LONGEST_HOLD / STEPS_BETWEEN_LOOKS {
+        for _ in 0..STEPS_BETWEEN_LOOKS {
+            simulation.advance_to(pose.clone(), HOLD_STEP)?;
+        }
         let moves = before
             .iter()
             .zip(simulation.skin())

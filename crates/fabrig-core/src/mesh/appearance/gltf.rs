@@ -4,19 +4,20 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{ExportError, Material, Materials, Notes, Picture, mime_of};
+use super::material::mime_of;
+use super::{Appearance, AppearanceError, Material, Picture};
 use crate::mesh::io::{GltfFile, MeshWithShapes};
 
 /// Reads the materials of a glTF file and the one of each polygon.
 pub(super) fn read(
     path: &Path,
     file: &MeshWithShapes,
-    notes: &mut Notes,
-) -> Result<(Materials, Vec<u32>), ExportError> {
+    notes: &mut Vec<String>,
+) -> Result<Appearance, AppearanceError> {
     let source = GltfFile::read(path)?;
     let list =
         |name: &str| -> Vec<Value> { source.root[name].as_array().cloned().unwrap_or_default() };
-    let mut materials = Materials {
+    let mut appearance = Appearance {
         textures: list("textures"),
         samplers: list("samplers"),
         extensions: list("extensionsUsed")
@@ -26,11 +27,11 @@ pub(super) fn read(
             .filter(|name| name.starts_with("KHR_materials") || *name == "KHR_texture_transform")
             .map(str::to_owned)
             .collect(),
-        ..Materials::default()
+        ..Appearance::default()
     };
     if list("materials").is_empty() {
-        notes.add(format!("{} has no materials", path.display()));
-        return Ok((Materials::default(), Vec::new()));
+        notes.push(format!("{} has no materials", path.display()));
+        return Ok(Appearance::default());
     }
     let mut kept = Vec::new();
     for (index, image) in list("images").iter().enumerate() {
@@ -48,11 +49,10 @@ pub(super) fn read(
         });
         match picture {
             Ok(picture) => {
-                kept.push(Some(materials.pictures.len()));
-                materials.pictures.push(picture);
+                kept.push(appearance.keep(picture, notes));
             }
             Err(reason) => {
-                notes.add(format!("picture {name} is left out: {reason}"));
+                notes.push(format!("picture {name} is left out: {reason}"));
                 kept.push(None);
             }
         }
@@ -61,8 +61,8 @@ pub(super) fn read(
         let image = texture["source"].as_u64()?;
         *kept.get(usize::try_from(image).ok()?)?
     };
-    let pictures: Vec<Option<usize>> = materials.textures.iter().map(picture_of).collect();
-    for (texture, picture) in materials.textures.iter_mut().zip(&pictures) {
+    let pictures: Vec<Option<usize>> = appearance.textures.iter().map(picture_of).collect();
+    for (texture, picture) in appearance.textures.iter_mut().zip(&pictures) {
         if let (Some(object), Some(picture)) = (texture.as_object_mut(), picture) {
             object.insert("source".to_owned(), Value::from(*picture));
             object.remove("extensions");
@@ -75,7 +75,7 @@ pub(super) fn read(
             .as_str()
             .map_or_else(|| format!("material_{index}"), str::to_owned);
         if dropped > 0 {
-            notes.add(format!(
+            notes.push(format!(
                 "{dropped} textures of {name} are left out: their picture or their second set of \
                  texture coordinates is not kept"
             ));
@@ -85,7 +85,7 @@ pub(super) fn read(
         let color = std::array::from_fn(|c| number(&surface["baseColorFactor"][c], 1.0));
         let texture = surface["baseColorTexture"]["index"].as_u64();
         let texture = texture.and_then(|t| usize::try_from(t).ok());
-        materials.list.push(Material {
+        appearance.materials.push(Material {
             color,
             roughness: number(&surface["roughnessFactor"], 1.0),
             metallic: number(&surface["metallicFactor"], 1.0),
@@ -96,7 +96,7 @@ pub(super) fn read(
     }
     // Textures without a picture are no longer named; the list keeps their places.
     if pictures.iter().any(Option::is_none) {
-        for (texture, picture) in materials.textures.iter_mut().zip(&pictures) {
+        for (texture, picture) in appearance.textures.iter_mut().zip(&pictures) {
             if picture.is_none() {
                 *texture = serde_json::json!({});
             }
@@ -106,7 +106,7 @@ pub(super) fn read(
     for (group, material) in file.mesh.groups().iter().zip(&file.group_materials) {
         of_polygon[group.faces.clone()].fill(*material);
     }
-    let count = materials.list.len();
+    let count = appearance.materials.len();
     let is_known = |m: &usize| *m < count;
     let of_polygon: Vec<u32> = of_polygon
         .into_iter()
@@ -115,9 +115,10 @@ pub(super) fn read(
     if of_polygon.contains(&(count as u32)) {
         // What glTF gives a primitive without one.
         let white = Material::new("default", [1.0; 4], 1.0, 1.0, None);
-        materials.list.push(white);
+        appearance.materials.push(white);
     }
-    Ok((materials, of_polygon))
+    appearance.of_polygon = of_polygon;
+    Ok(appearance)
 }
 
 /// Takes off textures that no longer have a picture, or stand on other texture coordinates than

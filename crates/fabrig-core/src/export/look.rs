@@ -1,12 +1,32 @@
-//! Plain colours, by what the pieces of a face are.
+//! Where the materials of what is written come from: a file, the rig, or plain colours by what
+//! the pieces of a face are.
 
-use super::{Material, Materials};
+use std::path::Path;
+
+use super::ExportError;
+use crate::mesh::appearance::{Appearance, Material, linear_color};
 use crate::rig::Rig;
 use crate::{Point, Vector};
 
 /// Half angle of iris and pupil from the line of sight in an adult's eye. (degrees)
 const IRIS: f64 = 29.0;
 const PUPIL: f64 = 10.0;
+
+/// What a rig's face looks like: as the file says that its materials are to come from, else as
+/// the rig keeps it, else in plain colours.
+pub(super) fn appearance(
+    rig: &Rig,
+    source: Option<&Path>,
+    notes: &mut Vec<String>,
+) -> Result<Appearance, ExportError> {
+    let given = match source {
+        Some(path) => Some(Appearance::of_file(path, &rig.face, notes)?),
+        None => None,
+    };
+    let known = given.filter(|a| !a.is_empty());
+    let known = known.or_else(|| rig.appearance.clone());
+    Ok(known.unwrap_or_else(|| of_parts(rig)))
+}
 
 /// Name, colour and roughness of what a face is made of.
 const KINDS: [(&str, [u8; 3], f64); 7] = [
@@ -19,22 +39,9 @@ const KINDS: [(&str, [u8; 3], f64); 7] = [
     ("other", [150, 140, 132], 0.6),
 ];
 
-/// Linear colour of an sRGB one, opaque.
-pub(super) fn linear(color: [u8; 3]) -> [f64; 4] {
-    let [r, g, b] = color.map(|c| {
-        let c = f64::from(c) / 255.0;
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    });
-    [r, g, b, 1.0]
-}
-
 /// A material for every kind of piece that the rig knows: skin, eyes with iris and pupil,
 /// teeth, tongue; with the one of each polygon of its face.
-pub(in crate::export) fn of_parts(rig: &Rig) -> (Materials, Vec<u32>) {
+pub(super) fn of_parts(rig: &Rig) -> Appearance {
     let mut part_of = vec![None; rig.face.vertex_count()];
     for (part, piece) in rig.parts.iter().enumerate() {
         for &vertex in &piece.vertices {
@@ -77,24 +84,35 @@ pub(in crate::export) fn of_parts(rig: &Rig) -> (Materials, Vec<u32>) {
     for (kind, (name, color, roughness)) in KINDS.into_iter().enumerate() {
         if kinds.contains(&kind) {
             index_of[kind] = Some(list.len() as u32);
-            list.push(Material::new(name, linear(color), roughness, 0.0, None));
+            list.push(Material::new(
+                name,
+                linear_color(color),
+                roughness,
+                0.0,
+                None,
+            ));
         }
     }
-    let of_polygon = kinds.iter().map(|&kind| index_of[kind].unwrap_or(0));
-    let materials = Materials {
-        list,
-        ..Materials::default()
-    };
-    (materials, of_polygon.collect())
+    Appearance {
+        materials: list,
+        of_polygon: kinds
+            .iter()
+            .map(|&kind| index_of[kind].unwrap_or(0))
+            .collect(),
+        ..Appearance::default()
+    }
 }
 
 /// A material for every surface of a recording: its name and colour.
-pub(in crate::export) fn of_surfaces(surfaces: &[(String, [u8; 4])]) -> Materials {
-    let list = surfaces
-        .iter()
-        .map(|(name, [r, g, b, _])| Material::new(name, linear([*r, *g, *b]), 0.5, 0.0, None));
-    Materials {
-        list: list.collect(),
-        ..Materials::default()
+///
+/// - `of_polygon`: the surface of each polygon
+pub(super) fn of_surfaces(surfaces: &[(String, [u8; 4])], of_polygon: Vec<u32>) -> Appearance {
+    let list = surfaces.iter().map(|(name, [r, g, b, _])| {
+        Material::new(name, linear_color([*r, *g, *b]), 0.5, 0.0, None)
+    });
+    Appearance {
+        materials: list.collect(),
+        of_polygon,
+        ..Appearance::default()
     }
 }

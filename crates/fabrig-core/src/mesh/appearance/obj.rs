@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::{ExportError, Material, Materials, Notes, Picture, mime_of};
+use super::material::mime_of;
+use super::{Appearance, AppearanceError, Material, Picture};
 use crate::mesh::Mesh;
 use crate::mesh::io::logical_lines;
 
@@ -14,9 +15,9 @@ const UNKNOWN: [f64; 4] = [0.6, 0.6, 0.6, 1.0];
 pub(super) fn read(
     path: &Path,
     mesh: &Mesh,
-    notes: &mut Notes,
-) -> Result<(Materials, Vec<u32>), ExportError> {
-    let failed = |e: std::io::Error| ExportError::Materials {
+    notes: &mut Vec<String>,
+) -> Result<Appearance, AppearanceError> {
+    let failed = |e: std::io::Error| AppearanceError::Unreadable {
         path: path.to_owned(),
         reason: e.to_string(),
     };
@@ -39,13 +40,13 @@ pub(super) fn read(
             _ => {}
         }
     }
-    let mut materials = Materials::default();
+    let mut appearance = Appearance::default();
     // The very lines that the mesh was read from: one a polygon.
     debug_assert_eq!(of_polygon.len(), mesh.face_count());
     of_polygon.resize(mesh.face_count(), 0);
     if !text.contains("usemtl") {
-        notes.add(format!("{} has no materials", path.display()));
-        return Ok((materials, Vec::new()));
+        notes.push(format!("{} has no materials", path.display()));
+        return Ok(appearance);
     }
     let mut known = HashMap::new();
     let mut files = Vec::new();
@@ -53,21 +54,22 @@ pub(super) fn read(
         match std::fs::read(&library) {
             Ok(bytes) => {
                 let text = String::from_utf8_lossy(&bytes);
-                let into = (&mut materials, &mut files);
+                let into = (&mut appearance, &mut files);
                 read_library(&text, &library, into, &mut known, notes);
             }
-            Err(e) => notes.add(format!("{} is left out: {e}", library.display())),
+            Err(e) => notes.push(format!("{} is left out: {e}", library.display())),
         }
     }
     // In the order of use; what the library has besides is left out.
-    materials.list = names
+    appearance.materials = names
         .iter()
         .map(|name| match known.remove(name) {
             Some(material) => material,
             None => Material::new(name, UNKNOWN, 0.6, 0.0, None),
         })
         .collect();
-    Ok((materials, of_polygon))
+    appearance.of_polygon = of_polygon;
+    Ok(appearance)
 }
 
 fn index_of(names: &mut Vec<String>, name: &str) -> u32 {
@@ -90,9 +92,9 @@ struct Entry {
 fn read_library(
     text: &str,
     path: &Path,
-    (materials, files): (&mut Materials, &mut Vec<PathBuf>),
+    (appearance, files): (&mut Appearance, &mut Vec<PathBuf>),
     known: &mut HashMap<String, Material>,
-    notes: &mut Notes,
+    notes: &mut Vec<String>,
 ) {
     let mut entries: Vec<Entry> = Vec::new();
     for line in text.lines() {
@@ -133,7 +135,7 @@ fn read_library(
     for entry in entries {
         let picture = entry.picture.and_then(|name| {
             let file = path.with_file_name(name.replace('\\', "/"));
-            picture(file, materials, files, notes)
+            picture(file, appearance, files, notes)
         });
         let color = if picture.is_some() {
             [1.0, 1.0, 1.0, entry.color[3]]
@@ -154,9 +156,9 @@ fn read_library(
 /// Texture and picture of a file, read once: `files` holds those that were.
 fn picture(
     file: PathBuf,
-    materials: &mut Materials,
+    appearance: &mut Appearance,
     files: &mut Vec<PathBuf>,
-    notes: &mut Notes,
+    notes: &mut Vec<String>,
 ) -> Option<(usize, usize)> {
     if let Some(k) = files.iter().position(|known| *known == file) {
         return Some((k, k));
@@ -164,25 +166,25 @@ fn picture(
     let bytes = match std::fs::read(&file) {
         Ok(bytes) => bytes,
         Err(e) => {
-            notes.add(format!("{} is left out: {e}", file.display()));
+            notes.push(format!("{} is left out: {e}", file.display()));
             return None;
         }
     };
     let Some(mime) = mime_of(&bytes) else {
-        notes.add(format!(
+        notes.push(format!(
             "{} is left out: neither PNG nor JPEG",
             file.display()
         ));
         return None;
     };
-    let index = materials.pictures.len();
-    materials.pictures.push(Picture {
+    let picture = Picture {
         name: file.file_stem()?.to_string_lossy().into_owned(),
         mime: mime.to_owned(),
         bytes,
-    });
+    };
+    let index = appearance.keep(picture, notes)?;
     let texture = serde_json::json!({"source": index});
-    materials.textures.push(texture);
+    appearance.textures.push(texture);
     files.push(file);
     Some((index, index))
 }
