@@ -11,6 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use fabrig_core::evaluation::{CheckGates, GATES};
 use fabrig_core::motion::TakeFormat;
 use fabrig_core::recording::RecordingOptions;
+use fabrig_core::render::Framing;
 
 /// Rigs any 3D face, animates it from performance capture, records it to MCAP.
 #[derive(Debug, Parser)]
@@ -488,6 +489,18 @@ pub(crate) enum Zoom {
     Eyes,
     /// The left eye
     Eye,
+}
+
+impl From<Zoom> for Framing {
+    fn from(zoom: Zoom) -> Self {
+        match zoom {
+            Zoom::All => Self::All,
+            Zoom::Face => Self::Face,
+            Zoom::Mouth => Self::Mouth,
+            Zoom::Eyes => Self::Eyes,
+            Zoom::Eye => Self::Eye,
+        }
+    }
 }
 
 /// A sheet of expressions.

@@ -43,6 +43,9 @@ pub enum Error {
     Scene(#[from] crate::scene::SceneError),
     #[error(transparent)]
     Export(#[from] crate::export::ExportError),
+    #[cfg(feature = "render")]
+    #[error(transparent)]
+    Render(#[from] crate::render::RenderError),
     #[error(transparent)]
     Recording(#[from] crate::recording::RecordingError),
 }

@@ -8,7 +8,10 @@ use anyhow::{Context, Result, ensure};
 use fabrig_core::Point;
 use fabrig_core::collision::PairMask;
 use fabrig_core::evaluation::{CheckGates, CheckReport, GATES, RigCheck, ShapeCheck, check_rig};
-use fabrig_core::render::{ColorMap, Image, Layer, Legend, Paint, Picture, Points, Rgb, View};
+use fabrig_core::render::{
+    ColorMap, FaceLook, Framing, Image, Layer, Legend, Paint, Picture, Points, Rgb, View,
+    simulation_layers,
+};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{Dynamics, FacePose, Scene, Simulation, hold_pose};
 use fabrig_core::template::Template;
@@ -16,10 +19,8 @@ use serde_json::json;
 
 use super::animate::load_rig;
 use super::html::{Figures, escape, page_of, table, write_page};
-use super::subjects::face_layers;
-use super::zoom::focus;
 use super::{Outcome, check_output, template_of};
-use crate::cli::{CheckArgs, Zoom};
+use crate::cli::CheckArgs;
 use crate::console::Console;
 
 /// The colours of the confidence map end here. (mm)
@@ -205,7 +206,7 @@ fn page(
         body += &format!("<p>{}</p>\n", escape(note));
     }
     body += "<h2>Confidence: distance of the face from the registered template</h2>\n";
-    let held = focus(Zoom::Face, template, &rig.positions, &rig.jaw.hinge);
+    let held = Framing::Face.points(template, &rig.positions, &rig.jaw.hinge);
     let mut figures = Figures::new()?;
     for view in ["front", "three-quarter", "side"] {
         figures.push(&confidence(rig, check, view.parse()?)?, view)?;
@@ -317,7 +318,7 @@ fn shape_pictures(
         let marks = check.marked[index].iter();
         let picture = Picture::new(SHAPE_SIZE, SHAPE_SIZE)
             .with_focus(held.iter().copied())
-            .with_layers(face_layers(&simulation)?)
+            .with_layers(simulation_layers(&simulation, &FaceLook::default())?)
             .with_points(Points {
                 centers: marks.map(|&v| skin[v as usize].cast()).collect(),
                 radius: 1.6,

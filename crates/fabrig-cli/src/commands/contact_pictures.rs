@@ -5,18 +5,18 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use fabrig_core::Point;
 use fabrig_core::recording::{RecordedFrame, RecordingReader};
-use fabrig_core::render::{FaceLook, Picture, RecordingContent, Sheet, View, recording_layers};
+use fabrig_core::render::{
+    FaceLook, Framing, Picture, RecordingContent, Sheet, View, recording_layers,
+};
 use fabrig_core::template::{JawHinge, human};
 
-use super::zoom::focus;
-use crate::cli::Zoom;
 use crate::console::Console;
 
 /// A picture with several moments side by side.
 struct Story {
     file: &'static str,
     view: View,
-    zoom: Zoom,
+    framing: Framing,
     /// (s)
     moments: &'static [f64],
 }
@@ -25,7 +25,7 @@ const STORIES: [Story; 4] = [
     Story {
         file: "contact_lips.png",
         view: View::Front,
-        zoom: Zoom::Mouth,
+        framing: Framing::Mouth,
         moments: &[0.6, 0.8, 0.9, 0.97, 1.03, 1.2],
     },
     Story {
@@ -34,19 +34,19 @@ const STORIES: [Story; 4] = [
             yaw: -12.0,
             pitch: 12.0,
         },
-        zoom: Zoom::Face,
+        framing: Framing::Face,
         moments: &[2.7, 3.1, 3.6, 4.0, 4.5, 5.2],
     },
     Story {
         file: "contact_ball.png",
         view: View::ThreeQuarter,
-        zoom: Zoom::Face,
+        framing: Framing::Face,
         moments: &[5.7, 5.8, 5.9],
     },
     Story {
         file: "contact_blink.png",
         view: View::Front,
-        zoom: Zoom::Eyes,
+        framing: Framing::Eyes,
         moments: &[7.4, 7.5, 7.7, 8.1, 8.5, 8.9],
     },
 ];
@@ -86,7 +86,7 @@ pub(super) fn draw(
             let layers = recording_layers(&frame, first, RecordingContent::Face, &look)?;
             let picture = Picture::new(SIZE[0], SIZE[1])
                 .with_view(story.view)
-                .with_focus(focus(story.zoom, human(), positions, hinge))
+                .with_focus(story.framing.points(human(), positions, hinge))
                 .with_layers(layers);
             sheet.push(picture.render()?, format!("{now:.2} s"));
             done += 1;

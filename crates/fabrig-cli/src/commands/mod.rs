@@ -18,7 +18,6 @@ mod rig;
 mod subjects;
 mod template;
 mod viewers;
-mod zoom;
 
 use std::borrow::Cow;
 use std::path::Path;

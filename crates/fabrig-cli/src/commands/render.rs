@@ -8,7 +8,7 @@ use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::RigFaceOptions;
 use fabrig_core::recording::RecordingReader;
 use fabrig_core::render::{
-    Edges, FaceLook, Image, Layer, Picture, RecordingContent, Sheet, View, mesh_layers,
+    Edges, FaceLook, Framing, Image, Layer, Picture, RecordingContent, Sheet, View, mesh_layers,
     recording_layers, write_gif,
 };
 use fabrig_core::rig::Rig;
@@ -16,7 +16,6 @@ use fabrig_core::template::{self, Template};
 
 use super::animate::load_rig;
 use super::subjects::{Subject, rig_subjects, template_subjects};
-use super::zoom::focus;
 use super::{Outcome, check_output, rig};
 use crate::cli::{RenderArgs, Zoom};
 use crate::console::Console;
@@ -84,7 +83,7 @@ fn render_template(
         "a template alone has no patches; rig a face with `fabrig rig`"
     );
     let zoom = args.zoom.unwrap_or(default_zoom(args));
-    let focus = focus(zoom, template, template.skin.positions(), &template.jaw);
+    let focus = Framing::from(zoom).points(template, template.skin.positions(), &template.jaw);
     let subjects = template_subjects(template, args)?;
     compose(console, args, views, subjects, focus)
 }
@@ -111,7 +110,7 @@ fn rig_of(console: &Console, input: &Path) -> Result<Rig> {
 /// What pictures of a rig hold; nothing for all of it.
 fn rig_focus(rig: &Rig, args: &RenderArgs) -> Result<Vec<Point>> {
     let zoom = args.zoom.unwrap_or(default_zoom(args));
-    let focus = focus(zoom, template::human(), &rig.positions, &rig.jaw.hinge);
+    let focus = Framing::from(zoom).points(template::human(), &rig.positions, &rig.jaw.hinge);
     ensure!(
         zoom == Zoom::All || !focus.is_empty(),
         "the rig was made with another template ({}): it cannot be zoomed in on",

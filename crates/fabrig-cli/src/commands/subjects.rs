@@ -4,13 +4,16 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use fabrig_core::Point;
-use fabrig_core::mesh::Polygons;
-use fabrig_core::render::{FaceLook, Label, Layer, Rgb, patch_layer, posed_template_layers};
+use fabrig_core::facs::expression_sheet;
+use fabrig_core::render::{
+    FaceLook, Label, Layer, posed_template_layers, simulation_labels, simulation_layers,
+    simulation_patch_layers,
+};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{FacePose, Scene, Simulation, hold_pose};
 use fabrig_core::template::Template;
 
-use super::pose::{expression_sheet, parse_pose};
+use super::pose::parse_pose;
 use crate::cli::RenderArgs;
 use crate::console::Console;
 
@@ -38,7 +41,7 @@ impl Subject {
 fn poses(shapes: &[String], args: &RenderArgs) -> Result<Vec<(String, Vec<f32>)>> {
     let parse = |text: &str| parse_pose(text, shapes);
     if let Some(sheet) = args.expressions {
-        expression_sheet(sheet.name(), shapes)
+        Ok(expression_sheet(sheet.name(), shapes)?)
     } else if args.all_shapes {
         Ok((0..shapes.len())
             .map(|shape| {
@@ -86,12 +89,12 @@ pub(super) fn rig_subjects(console: &Console, rig: Rig, args: &RenderArgs) -> Re
         pose.weights = weights;
         hold_pose(&mut simulation, &pose)?;
         let layers = if args.patches {
-            patch_layers_now(&simulation)?
+            simulation_patch_layers(&simulation)?
         } else {
-            face_layers(&simulation)?
+            simulation_layers(&simulation, &FaceLook::default())?
         };
         let labels = if args.names {
-            patch_labels(&simulation)
+            simulation_labels(&simulation)
         } else {
             Vec::new()
         };
@@ -109,67 +112,4 @@ pub(super) fn rig_subjects(console: &Console, rig: Rig, args: &RenderArgs) -> Re
         }
     }
     Ok(subjects)
-}
-
-/// Skin and loose parts of a simulated face.
-pub(super) fn face_layers(simulation: &Simulation) -> Result<Vec<Layer>> {
-    let look = FaceLook::default();
-    let rig = simulation.rig();
-    let skin: Vec<Point> = simulation.skin().iter().map(|p| p.cast()).collect();
-    let mut owner = vec![None; skin.len()];
-    for (part, piece) in rig.parts.iter().enumerate() {
-        for (k, &vertex) in piece.vertices.iter().enumerate() {
-            owner[vertex as usize] = Some((part, k as u32));
-        }
-    }
-    let mut skin_polygons = Polygons::new();
-    let mut part_polygons = vec![Polygons::new(); rig.parts.len()];
-    for face in rig.face.polygons().iter() {
-        let places: Option<Vec<(usize, u32)>> = face.iter().map(|&v| owner[v as usize]).collect();
-        match places {
-            Some(places) => {
-                let corners: Vec<u32> = places.iter().map(|p| p.1).collect();
-                part_polygons[places[0].0].push(&corners);
-            }
-            None => skin_polygons.push(face),
-        }
-    }
-    let mut layers = vec![look.skin(skin.clone(), &skin_polygons)?];
-    for ((part, polygons), pose) in rig.parts.iter().zip(&part_polygons).zip(simulation.parts()) {
-        if polygons.is_empty() {
-            continue;
-        }
-        let positions = part.vertices.iter().map(|&v| skin[v as usize]).collect();
-        let gaze = pose.motion.rotation * fabrig_core::Vector::z();
-        layers.push(look.part(&part.name, positions, polygons, gaze)?);
-    }
-    Ok(layers)
-}
-
-fn patch_layers_now(simulation: &Simulation) -> Result<Vec<Layer>> {
-    let patches = simulation.rig().patches.iter().enumerate();
-    patches
-        .map(|(index, patch)| {
-            let nodes = simulation.patch_positions(index);
-            let nodes = nodes.iter().map(|p| p.cast()).collect();
-            Ok(patch_layer(&patch.patch.chart, nodes)?)
-        })
-        .collect()
-}
-
-fn patch_labels(simulation: &Simulation) -> Vec<Label> {
-    let patches = simulation.rig().patches.iter().enumerate();
-    patches
-        .map(|(index, patch)| {
-            let chart = &patch.patch.chart;
-            let middle = chart
-                .grid
-                .index(chart.grid.u_count / 2, chart.grid.v_count / 2);
-            Label {
-                anchor: simulation.patch_positions(index)[middle].cast(),
-                text: chart.name.replace('_', " "),
-                color: Rgb::from_srgb(chart.color),
-            }
-        })
-        .collect()
 }

@@ -7,14 +7,14 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use fabrig_core::anatomy::{self, Resolution};
 use fabrig_core::cloth::Materials;
 use fabrig_core::evaluation::{CheckGates, check_rig};
-use fabrig_core::facs::{ARKIT_SHAPES, ActionUnitMap, ActionUnitTable};
+use fabrig_core::facs::{ARKIT_SHAPES, ActionUnitMap, ActionUnitTable, expression_sheet};
 use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::{
     OwnTemplateOptions, neutral_of_shapes, read_own_shapes, template_from_face,
 };
 use fabrig_core::registration::{RegistrationOptions, read_landmarks};
 use fabrig_core::render::{
-    FaceLook, Picture, Sheet, patch_layers, posed_template_layers, template_layers,
+    FaceLook, Framing, Picture, Sheet, patch_layers, posed_template_layers, template_layers,
 };
 use fabrig_core::rig::{
     RigOptions, rig_of_template, stored_template_weights, write_template_weights,
@@ -22,10 +22,8 @@ use fabrig_core::rig::{
 use fabrig_core::scene::Scene;
 use fabrig_core::template::{self, Template};
 
-use super::pose::expression_sheet;
-use super::zoom::focus;
 use super::{Outcome, check_output, stem, template_of};
-use crate::cli::{TemplateBuildArgs, TemplateCommand, Zoom};
+use crate::cli::{TemplateBuildArgs, TemplateCommand};
 use crate::console::Console;
 
 /// The folder of the bundled template, and what its source has in it.
@@ -250,12 +248,7 @@ fn draw(template: &Template, path: &Path) -> Result<()> {
         }
     }
     let shapes: Vec<String> = template.shapes.iter().map(|s| s.name.clone()).collect();
-    let held = focus(
-        Zoom::Face,
-        template,
-        template.skin.positions(),
-        &template.jaw,
-    );
+    let held = Framing::Face.points(template, template.skin.positions(), &template.jaw);
     for (name, weights) in expression_sheet("motion", &shapes)? {
         let picture = Picture::new(SIZE, SIZE)
             .with_focus(held.iter().copied())

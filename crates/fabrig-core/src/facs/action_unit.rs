@@ -62,6 +62,22 @@ pub enum FacsError {
         /// The most similar shape that there is.
         nearest: String,
     },
+    /// A pose names a shape that there is not.
+    #[error("there is no shape '{found}' (nearest: '{nearest}')")]
+    UnknownName {
+        /// The name.
+        found: String,
+        /// The most similar shape that there is.
+        nearest: String,
+    },
+    /// A weight of a pose is NaN, infinite, or outside [0, 1].
+    #[error("'{shape}' has the weight {found}; weights lie in [0, 1]")]
+    WeightOutOfRange {
+        /// The shape.
+        shape: String,
+        /// Its weight.
+        found: f64,
+    },
     /// The intensities do not fit the table.
     #[error("expected {expected} intensities, one per action unit, got {found}")]
     IntensityCount {

@@ -8,6 +8,7 @@
 mod action_unit;
 mod arkit;
 mod expressions;
+mod pose;
 mod unit_map;
 mod unit_name;
 
@@ -16,5 +17,6 @@ pub use arkit::{
     ARKIT_SHAPES, JAW_OPEN, MOUTH_CLOSE, ShapeMatch, match_shape, mirrored_shape, nearest_name,
 };
 pub use expressions::{NamedExpression, named_expressions};
+pub use pose::{expression_sheet, named_weights};
 pub use unit_map::{ActionUnitMap, UnitIntensity};
 pub use unit_name::{Side, UnitName, match_unit};

@@ -64,7 +64,7 @@ pub enum ClipError {
 }
 
 /// What reading a take had to decide; nothing of it happens unsaid.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ClipNotes {
     /// Weights a little outside [0, 1] that were clamped.
     pub clamped_weights: usize,
@@ -87,7 +87,7 @@ pub struct ClipNotes {
 }
 
 /// Frames in which the tracker lost the face.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Gap {
     /// Time of the first of them. (s)
     pub start: f64,
@@ -98,7 +98,7 @@ pub struct Gap {
 }
 
 /// Parts of a clip beside its weights. Each list is empty or has one entry per frame.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ClipTracks {
     /// Pose of the head.
     pub head: Vec<HeadPose>,

@@ -25,6 +25,7 @@ mod cost;
 mod own_shapes;
 mod own_template;
 mod rig_face;
+mod runtime;
 mod strain;
 mod timing;
 
@@ -34,4 +35,5 @@ pub use cost::{CostRow, cost};
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
+pub use runtime::{FaceRow, RuntimeProgress, RuntimeReport, SizeRow, runtime};
 pub use timing::TimeStatistics;

@@ -21,12 +21,14 @@ mod camera;
 mod color;
 mod error;
 mod face;
+mod framing;
 mod image_buffer;
 mod layer;
 mod light;
 mod palette;
 mod picture;
 mod sheet;
+mod simulated;
 mod subjects;
 mod tracer;
 
@@ -36,10 +38,12 @@ pub use camera::{Camera, Projection, View};
 pub use color::{ColorMap, Rgb};
 pub use error::RenderError;
 pub use face::{FaceLook, mesh_layers};
+pub use framing::Framing;
 pub use image_buffer::Image;
 pub use layer::{Edges, Layer, Material, Paint, Points};
 pub use picture::{Background, Picture, Shot};
 pub use sheet::Sheet;
+pub use simulated::{simulation_labels, simulation_layers, simulation_patch_layers};
 pub use subjects::{
     RecordingContent, patch_layer, patch_layers, posed_template_layers, recording_layers,
     template_layers,

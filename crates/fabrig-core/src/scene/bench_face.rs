@@ -43,3 +43,32 @@ pub fn face_bench_scene(
         frames,
     ))
 }
+
+/// All frames of a take at `fps` a second.
+pub fn all_frames(clip: &Clip, fps: f64) -> Range<usize> {
+    0..(clip.duration() * fps).floor() as usize
+}
+
+/// The `count` frames on end, at `fps` a second, in which the weights change most.
+pub fn liveliest_frames(clip: &Clip, fps: f64, count: usize) -> Range<usize> {
+    let all = all_frames(clip, fps);
+    let start = clip.times()[0];
+    let mut previous = clip.sample(start).weights;
+    // Sums of change up to each frame.
+    let mut sums = vec![0.0_f64];
+    for frame in 1..=all.end {
+        let weights = clip.sample(start + frame as f64 / fps).weights;
+        let change: f32 = weights
+            .iter()
+            .zip(&previous)
+            .map(|(a, b)| (a - b).abs())
+            .sum();
+        sums.push(sums[frame - 1] + f64::from(change));
+        previous = weights;
+    }
+    let count = count.min(all.end);
+    let first = (0..=all.end - count)
+        .max_by(|&a, &b| (sums[a + count] - sums[a]).total_cmp(&(sums[b + count] - sums[b])))
+        .unwrap_or(0);
+    first..first + count
+}

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::cloth::ClothOptions;
 use fabrig_core::cloth::bench::{BenchScene, Pareto, pareto, settings};
-use fabrig_core::scene::{Scene, face_bench_scene};
+use fabrig_core::scene::{Scene, all_frames, face_bench_scene, liveliest_frames};
 
 use super::demo_scene;
 use super::plot::page;
@@ -22,9 +22,9 @@ pub(crate) fn run(console: &Console, args: &BenchParetoArgs) -> Result<Outcome> 
     let clip = demo_scene::take()?;
     let rig = demo_scene::demo_rig(console)?;
     let range = if args.full {
-        demo_scene::all_frames(&clip)
+        all_frames(&clip, demo_scene::FPS)
     } else {
-        demo_scene::liveliest(&clip, 90)
+        liveliest_frames(&clip, demo_scene::FPS, 90)
     };
     let scene = Scene::default();
     let mut face = face_bench_scene(&rig, &clip, &scene, demo_scene::FPS, range)?;
