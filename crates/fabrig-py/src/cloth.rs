@@ -35,9 +35,12 @@ type PairArgument = (u32, u32, Vec<(u32, u32)>, f64);
 /// - `material`: "linear", "sphincter" or "fat" (the paper's Table 2), a dict of its numbers
 ///   on top of "linear" (or of another by `base`), or a list with one of these per patch
 /// - `periodic`: whether rows close into rings; one flag, or one per patch
-/// - `anchors`: per patch the indices (row * columns + column) of nodes held to anchors
+/// - `anchors`: per patch the indices (row * columns + column) of nodes held to anchors, with
+///   `anchor_strength` times the strength of attachments
 /// - `pairs`: tuples (patch, other patch, (K, 2) node indices, strength) held to each other
 /// - `substeps`: per 1/60 s; `rest_blend`: 0 keeps rest lengths (wrinkles), 1 takes the targets'
+/// - `rest_imperfection`: smooth waves put on the rest shape (mm), so that wrinkles come out the
+///   same again; `seed` makes others
 /// - `standing_gravity`: gravity under which rest is at equilibrium (mm/s^2)
 /// - `precision`: "single", "single_scalar" or "double"; `integrator`: "bdf2" or
 ///   "backward_euler"
@@ -197,7 +200,8 @@ impl PyCloth {
         Ok(report)
     }
 
-    /// Puts the cloth on `targets` at once, moving with `velocities` (at rest without).
+    /// Puts the cloth on `targets` at once, moving with `velocities` (at rest without), and its
+    /// anchors on `anchors`, as for `step`.
     #[pyo3(signature = (targets, velocities=None, *, anchors=None))]
     fn reset(
         &mut self,

@@ -5,75 +5,36 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-create_exception!(
-    fabrig,
-    FabrigError,
-    PyException,
-    "Anything that fabrig refuses."
-);
-create_exception!(
-    fabrig,
-    InputError,
-    FabrigError,
-    "An argument has the wrong shape or value."
-);
-create_exception!(
-    fabrig,
-    MeshError,
-    FabrigError,
-    "A mesh or mesh file is not valid."
-);
-create_exception!(
-    fabrig,
-    TemplateError,
-    FabrigError,
-    "A template is not valid."
-);
-create_exception!(
-    fabrig,
-    RegistrationError,
-    FabrigError,
-    "A face could not be registered."
-);
-create_exception!(
-    fabrig,
-    RigError,
-    FabrigError,
-    "A rig could not be built, saved or loaded."
-);
-create_exception!(fabrig, MotionError, FabrigError, "A take is not valid.");
-create_exception!(
-    fabrig,
-    SceneError,
-    FabrigError,
-    "A scene could not be set up or stepped."
-);
-create_exception!(
-    fabrig,
-    RecordingError,
-    FabrigError,
-    "A recording could not be written."
-);
+/// One exception a line: name, what it derives from, what it says.
+macro_rules! exceptions {
+    ($($name:ident($base:ty): $text:literal)*) => {
+        $(create_exception!(fabrig, $name, $base, $text);)*
 
-create_exception!(
-    fabrig,
-    ExportError,
-    FabrigError,
-    "A face could not be written for another program."
-);
+        pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+            let py = m.py();
+            $(m.add(stringify!($name), py.get_type::<$name>())?;)*
+            Ok(())
+        }
+    };
+}
 
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    let py = m.py();
-    m.add("FabrigError", py.get_type::<FabrigError>())?;
-    m.add("InputError", py.get_type::<InputError>())?;
-    m.add("MeshError", py.get_type::<MeshError>())?;
-    m.add("TemplateError", py.get_type::<TemplateError>())?;
-    m.add("RegistrationError", py.get_type::<RegistrationError>())?;
-    m.add("RigError", py.get_type::<RigError>())?;
-    m.add("MotionError", py.get_type::<MotionError>())?;
-    m.add("SceneError", py.get_type::<SceneError>())?;
-    m.add("ExportError", py.get_type::<ExportError>())?;
-    m.add("RecordingError", py.get_type::<RecordingError>())
+exceptions! {
+    FabrigError(PyException): "Anything that fabrig refuses."
+    InputError(FabrigError): "An argument has the wrong shape or value."
+    MeshError(FabrigError): "A mesh or mesh file is not valid."
+    TemplateError(FabrigError): "A template is not valid."
+    RegistrationError(FabrigError): "A face could not be registered."
+    LandmarkError(RegistrationError): "Landmarks could not be read."
+    RigError(FabrigError): "A rig could not be built, saved or loaded."
+    EditError(RigError): "Edits could not be read or applied."
+    CheckError(RigError): "A rig could not be checked."
+    MotionError(FabrigError): "A take is not valid."
+    RetargetError(FabrigError): "A motion could not be fitted."
+    SceneError(FabrigError): "A scene could not be set up or stepped."
+    ClothError(SceneError): "Cloth could not be set up or stepped."
+    RecordingError(FabrigError): "A recording could not be written or read."
+    ExportError(FabrigError): "A face could not be written for another program."
+    RenderError(FabrigError): "A picture could not be drawn."
 }
 
 /// An argument that cannot be used, named first: `vertices: expected shape (N, 3), ...`.
@@ -94,19 +55,22 @@ pub(crate) fn to_py(error: impl Into<Error>) -> PyErr {
         cause = source.source();
     }
     match error {
-        Error::Mesh(_) | Error::MeshIo(_) => MeshError::new_err(message),
+        Error::Mesh(_) | Error::MeshIo(_) | Error::OwnShapes(_) => MeshError::new_err(message),
         Error::Template(_) => TemplateError::new_err(message),
         Error::Registration(_) => RegistrationError::new_err(message),
-        Error::Rig(_)
-        | Error::Check(_)
-        | Error::Edit(_)
-        | Error::Anatomy(_)
-        | Error::Transfer(_)
-        | Error::Skin(_) => RigError::new_err(message),
+        Error::LandmarkFile(_) => LandmarkError::new_err(message),
+        Error::Edit(_) => EditError::new_err(message),
+        Error::Check(_) | Error::Evaluation(_) => CheckError::new_err(message),
+        Error::Rig(_) | Error::Anatomy(_) | Error::Transfer(_) | Error::Skin(_) => {
+            RigError::new_err(message)
+        }
         Error::Motion(_) | Error::Facs(_) => MotionError::new_err(message),
-        Error::Scene(_) | Error::Cloth(_) => SceneError::new_err(message),
+        Error::Retarget(_) => RetargetError::new_err(message),
+        Error::Cloth(_) => ClothError::new_err(message),
+        Error::Scene(_) => SceneError::new_err(message),
         Error::Export(_) => ExportError::new_err(message),
         Error::Recording(_) => RecordingError::new_err(message),
+        Error::Render(_) => RenderError::new_err(message),
         // The core may gain variants.
         _ => FabrigError::new_err(message),
     }

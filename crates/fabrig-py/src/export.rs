@@ -75,7 +75,7 @@ pub(crate) fn export<'py>(
         return Err(input("baked: there is nothing to bake without motion"));
     }
     let rig = Arc::clone(&rig.inner);
-    let mut progress = Progress::new(progress);
+    let mut progress = Progress::new(py, progress)?;
     let report = py.detach(|| {
         fabrig_core::export::export(&rig, &path, &options, &mut |step| {
             progress.report(step.stage, step.fraction)
@@ -85,17 +85,19 @@ pub(crate) fn export<'py>(
     arrays::to_python(py, &report.map_err(to_py)?)
 }
 
-/// Converts a recording to .glb, .gltf, .usda, .npz, .pc2, .mdd or a folder of OBJ files; returns
+/// Converts the file `recording` to `output`, by its ending: .glb, .gltf, .usda, .npz, .pc2, .mdd or a folder of OBJ files; returns
 /// a report.
 ///
 /// - `rig`: the rig that was recorded, to keep its polygons, texture coordinates, units and
 ///   place; without it the recording's triangles in the head frame are written
 /// - `face`: the mesh that the rig was made from, for its materials
 /// - `unit`: "own", "mm", "cm", "m" or "in"; metres for glTF by default, else the rig's own
+/// - `name`: of the object in the file; `still_head`: leave the motion of the head out
 /// - `components`: morph targets of a glTF; as many as `tolerance` (mm) needs by default
-/// - `progress`: called with (stage, share)
+/// - `progress`: True for a bar, or a function of (stage, share)
 ///
-/// >>> fabrig.convert("out.mcap", "out.usda", rig=fabrig.Rig.load("face.fabrig"))
+/// >>> rig = fabrig.Rig.load("face.fabrig")  # doctest: +SKIP
+/// >>> report = fabrig.convert("out.mcap", "out.usda", rig=rig)  # doctest: +SKIP
 #[pyfunction]
 #[pyo3(signature = (recording, output, *, rig=None, face=None, unit=None, name=None,
                     still_head=false, components=None, tolerance=None, progress=None))]
@@ -130,7 +132,7 @@ pub(crate) fn convert<'py>(
         rig: rig.map(|rig| Arc::clone(&rig.inner)),
         export: layout.options()?,
     };
-    let mut progress = Progress::new(progress);
+    let mut progress = Progress::new(py, progress)?;
     let report = py.detach(|| {
         fabrig_core::export::convert(&recording, &output, &options, &mut |step| {
             progress.report(step.stage, step.fraction)

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use fabrig_core::Point;
+use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
-use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, rig_face};
+use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, read_own_shapes, rig_face};
 use fabrig_core::rig::Expression;
-use fabrig_core::template;
+use fabrig_core::template::Template;
 use fabrig_core::transfer::{AlphaMode, OffsetMode};
 use pyo3::prelude::*;
 
@@ -18,6 +18,7 @@ use crate::errors::{input, to_py};
 use crate::mesh::PyMesh;
 use crate::motion::PyClip;
 use crate::progress::Progress;
+use crate::registration::registration_options;
 use crate::rig::PyRig;
 use crate::simulation::scene;
 use crate::template::template_of;
@@ -25,53 +26,72 @@ use crate::template::template_of;
 /// Makes the rig of a neutral face.
 ///
 /// - `vertices`: shape (N, 3), any unit; `faces`: integer array of shape (F, corners), or lists;
-///   or a `Mesh` alone, which keeps its texture coordinates and groups, and one that was
-///   read from a file its materials and pictures
-/// - `landmarks`: name -> (x, y, z) in the mesh's own units
-/// - `unit_mm`: millimetres per unit, where it is known
+///   or one argument that `Mesh.of` takes: a `Mesh`, the path of a file, a mesh of trimesh, ...
+///   One that was read from a file keeps its materials and pictures
+/// - `landmarks`: name -> (x, y, z) in the mesh's own units; or 68 points in iBUG's order, 468 or
+///   478 in MediaPipe's, shape (K, 3); or a file of either
+/// - `landmarks_order`: "ibug68" or "mediapipe"; by the count of points without it
+/// - `unit`: "mm", "cm", "m", "in", or millimetres per unit, where it is known
+/// - `min_confidence`: margin below which an automatic alignment is refused, 0 to 1
 /// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
 ///   vertices follow those given
 /// - `expressions`: shape -> vertices (N, 3) of this very face, in ARKit's names, to fit the
-///   muscles to; `alpha` says how: one amplitude a "patch", or a patch and "shape", a linear
+///   muscles to; or the folder or glTF file that has them
+/// - `alpha`: what is made of them: one amplitude a "patch", or a patch and "shape", a linear
 ///   "map", or their "own" shapes as they are
 /// - `offsets`: how the template's displacements are put on the face, "global", "frame" or
 ///   "transfer" (deformation transfer)
-/// - `template`: folder of a template of your own, as `fabrig template build` makes it
-/// - `progress`: called with (stage, share)
+/// - `template`: a `Template`, or the folder of one, instead of the bundled one
+/// - `progress`: True for a bar, or a function of (stage, share)
+///
+/// >>> face = fabrig.demo_face()
+/// >>> fabrig.rig(face.vertices, face.faces)
+/// Rig(13082 vertices, 44 patches, 19380 nodes)
 #[pyfunction]
 #[pyo3(signature = (
-    vertices, faces=None, *, landmarks=None, unit_mm=None, cut_seams=None, expressions=None,
-    alpha="own", offsets="global", template=None, progress=None
+    vertices, faces=None, *, landmarks=None, landmarks_order=None, unit=None, min_confidence=None,
+    cut_seams=None, expressions=None, alpha="own", offsets="global", template=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
     py: Python<'_>,
     vertices: &Bound<'_, PyAny>,
     faces: Option<&Bound<'_, PyAny>>,
-    landmarks: Option<BTreeMap<String, [f64; 3]>>,
-    unit_mm: Option<f64>,
+    landmarks: Option<&Bound<'_, PyAny>>,
+    landmarks_order: Option<&str>,
+    unit: Option<&Bound<'_, PyAny>>,
+    min_confidence: Option<f64>,
     cut_seams: Option<Vec<String>>,
-    expressions: Option<BTreeMap<String, Bound<'_, PyAny>>>,
+    expressions: Option<&Bound<'_, PyAny>>,
     alpha: &str,
     offsets: &str,
-    template: Option<PathBuf>,
+    template: Option<&Bound<'_, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
-    let mut options = RigFaceOptions::default();
-    let face = match (vertices.cast::<PyMesh>(), faces) {
-        (Ok(mesh), None) => {
-            options.source.clone_from(&mesh.get().source);
+    let mut source = None;
+    let face = match faces {
+        None if vertices.hasattr("dtype")? => {
+            return Err(input("faces: needed beside an array of vertices"));
+        }
+        None => {
+            let mesh = PyMesh::of(vertices)?;
+            source.clone_from(&mesh.get().source);
             mesh.get().inner.clone()
         }
-        (Ok(_), Some(_)) => return Err(input("faces: the mesh given has its own")),
-        (Err(_), None) => return Err(input("faces: needed beside an array of vertices")),
-        (Err(_), Some(faces)) => {
+        Some(_) if vertices.is_instance_of::<PyMesh>() => {
+            return Err(input("faces: the mesh given has its own"));
+        }
+        Some(faces) => {
             let positions = arrays::points("vertices", vertices)?;
             let polygons = arrays::polygons("faces", faces)?;
             Mesh::new(positions, polygons).map_err(to_py)?
         }
     };
-    options.registration.unit_mm = unit_mm;
+    let mut options = RigFaceOptions {
+        source,
+        registration: registration_options(landmarks, landmarks_order, unit, min_confidence)?,
+        ..RigFaceOptions::default()
+    };
     for name in cut_seams.unwrap_or_default() {
         match name.as_str() {
             "mouth" => options.cut_seams.mouth = true,
@@ -83,18 +103,14 @@ pub(crate) fn rig(
             }
         }
     }
-    options.registration.landmarks = landmarks
-        .unwrap_or_default()
-        .into_iter()
-        .map(|(name, place)| (name, Point::from(place)))
-        .collect();
     options.rig.alpha = one_of("alpha", alpha, &ALPHA_MODES)?;
     options.rig.offsets = one_of("offsets", offsets, &OFFSET_MODES)?;
-    for (name, vertices) in expressions.unwrap_or_default() {
-        options.expressions.push(expression(name, &vertices)?);
-    }
     let template = template_of(template)?;
-    let mut progress = Progress::new(progress);
+    if let Some(expressions) = expressions {
+        (options.expressions, options.expressions_on) =
+            own_expressions(py, expressions, &face, &template)?;
+    }
+    let mut progress = Progress::new(py, progress)?;
     let rigged = py.detach(|| {
         rig_face(&face, &template, &options, &mut |step| {
             progress.report(step.stage, step.fraction)
@@ -102,9 +118,35 @@ pub(crate) fn rig(
     });
     // What the callback raised is the reason, not the cancellation that followed.
     progress.finish()?;
+    let mut rigged = rigged.map_err(to_py)?;
+    // As the report of the rig itself, with the time of building it.
+    if let Ok(report) = serde_json::to_string(&rigged.report) {
+        rigged.rig.registration_report = report;
+    }
     Ok(PyRig {
-        inner: Arc::new(rigged.map_err(to_py)?.rig),
+        inner: Arc::new(rigged.rig),
     })
+}
+
+/// The face's own expressions, and the mesh that they are on where it is another one.
+pub(crate) fn own_expressions(
+    py: Python<'_>,
+    value: &Bound<'_, PyAny>,
+    face: &Mesh,
+    template: &Template,
+) -> PyResult<(Vec<Expression>, Option<Mesh>)> {
+    if let Ok(source) = value.extract::<PathBuf>() {
+        let own = py.detach(|| read_own_shapes(&source, face, template));
+        let own = own.map_err(to_py)?;
+        return Ok((own.expressions, own.neutral));
+    }
+    let named: BTreeMap<String, Bound<'_, PyAny>> = value
+        .extract()
+        .map_err(|_| input("expressions: expected shape -> vertices, a folder or a glTF file"))?;
+    let each = named
+        .into_iter()
+        .map(|(name, vertices)| expression(name, &vertices, template));
+    Ok((each.collect::<PyResult<_>>()?, None))
 }
 
 const ALPHA_MODES: [(&str, AlphaMode); 4] = [
@@ -136,8 +178,12 @@ pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -
 }
 
 /// One of the face's own shapes, by its name.
-fn expression(name: String, vertices: &Bound<'_, PyAny>) -> PyResult<Expression> {
-    let shapes = &template::human().shapes;
+fn expression(
+    name: String,
+    vertices: &Bound<'_, PyAny>,
+    template: &Template,
+) -> PyResult<Expression> {
+    let shapes = &template.shapes;
     let mut weights = vec![0.0; shapes.len()];
     let names = match_shape(&name).map_or_else(Vec::new, ShapeMatch::names);
     for (shape, weight) in shapes.iter().zip(&mut weights) {
@@ -160,26 +206,45 @@ fn expression(name: String, vertices: &Bound<'_, PyAny>) -> PyResult<Expression>
 
 /// Simulates a rig through a take and records it to an MCAP file; returns a report.
 ///
-/// - `scene`: a mapping of the fields of a scene file; the other arguments go before it
+/// - `rig`, `clip`: what is simulated; `output`: the file
+/// - `scene`: a mapping of the fields of a scene file, or its path; the other arguments go
+///   before it
 /// - `fps`: frames a second; the take's own by default
-/// - `gravity` (mm/s^2) and `wind` (mm/s): three numbers, world axes, +Y up
-/// - `progress`: called with ("simulate", share); raising or Ctrl-C ends the recording there,
-///   whole and readable
+/// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
+/// - `substeps`: of the cloth, per 1/60 s
+/// - `dynamics`: False leaves patches where the muscle shapes want them
+/// - `skin_hz`, `patches_hz`, `points_hz`, `strain_hz`: meshes a second in the recording, 0 for
+///   none
+/// - `rig_name`, `take_name`: what the recording calls them
+/// - `layout`: where to write the layout for Foxglove and Lichtblick; nowhere by default
+/// - `progress`: True for a bar, or a function of (stage, share)
+///
+/// >>> rig, clip = fabrig.rig(fabrig.demo_face()), fabrig.demo_take().between(0, 0.1)
+/// >>> fabrig.animate(rig, clip, "out.mcap", fps=30)["frames"]
+/// 4
 #[pyfunction]
 #[pyo3(signature = (rig, clip, output, *, scene=None, fps=None, gravity=None, wind=None, substeps=None,
-                    dynamics=true, progress=None))]
+                    dynamics=true, skin_hz=None, patches_hz=None, points_hz=None, strain_hz=None,
+                    rig_name=None, take_name=None, layout=None, progress=None))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn animate<'py>(
     py: Python<'py>,
     rig: &PyRig,
     clip: &PyClip,
     output: PathBuf,
-    scene: Option<Bound<'py, PyAny>>,
+    scene: Option<&Bound<'py, PyAny>>,
     fps: Option<f64>,
-    gravity: Option<Bound<'py, PyAny>>,
-    wind: Option<Bound<'py, PyAny>>,
+    gravity: Option<&Bound<'py, PyAny>>,
+    wind: Option<&Bound<'py, PyAny>>,
     substeps: Option<u32>,
     dynamics: bool,
+    skin_hz: Option<f64>,
+    patches_hz: Option<f64>,
+    points_hz: Option<f64>,
+    strain_hz: Option<f64>,
+    rig_name: Option<String>,
+    take_name: Option<String>,
+    layout: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     if let Some(fps) = fps
@@ -187,18 +252,28 @@ pub(crate) fn animate<'py>(
     {
         return Err(input(format!("fps: {fps} is not a frame rate")));
     }
-    let scene = self::scene(
-        scene.as_ref(),
-        gravity.as_ref(),
-        wind.as_ref(),
-        substeps,
-        dynamics,
-    )?;
-    let options = AnimateOptions {
+    let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
+    let mut options = AnimateOptions {
         fps,
         ..AnimateOptions::default()
     };
-    let mut progress = Progress::new(progress);
+    options.rig_name = rig_name.unwrap_or(options.rig_name);
+    options.take_name = take_name.unwrap_or(options.take_name);
+    let recording = &mut options.recording;
+    for (name, rate, value) in [
+        ("skin_hz", skin_hz, &mut recording.skin_hz),
+        ("patches_hz", patches_hz, &mut recording.patches_hz),
+        ("points_hz", points_hz, &mut recording.points_hz),
+        ("strain_hz", strain_hz, &mut recording.strain_hz),
+    ] {
+        *value = rate.unwrap_or(*value);
+        if !(value.is_finite() && *value >= 0.0) {
+            return Err(input(format!(
+                "{name}: {value} is not a rate of at least 0"
+            )));
+        }
+    }
+    let mut progress = Progress::new(py, progress)?;
     let (rig, clip) = (Arc::clone(&rig.inner), clip.inner.clone());
     let report = py.detach(|| {
         fabrig_core::pipeline::animate(rig, clip, scene, &output, &options, &mut |now| {
@@ -206,5 +281,10 @@ pub(crate) fn animate<'py>(
         })
     });
     progress.finish()?;
-    arrays::to_python(py, &report.map_err(to_py)?)
+    let report = report.map_err(to_py)?;
+    if let Some(path) = layout {
+        let text = report.foxglove_layout.as_bytes();
+        write_atomically(&path, |file| file.write_all(text))?;
+    }
+    arrays::to_python(py, &report)
 }

@@ -1,20 +1,34 @@
 //! Stepping a rig.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation};
+use fabrig_core::motion::EyeAngles;
+use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation, hold_pose};
 use nalgebra::{Isometry3, Vector3};
-use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays;
-use crate::errors::{input, to_py};
+use crate::errors::{SceneError as SceneFailure, input, to_py};
 use crate::motion::PyClip;
+use crate::pose::weights_of;
+use crate::render::{Content, Shot, draw_simulation};
 use crate::rig::PyRig;
 
-/// A scene from keyword arguments: a mapping of a scene's fields, then single ones over it.
+/// Plain values as JSON.
+pub(crate) fn json_of(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+    value
+        .py()
+        .import("fabrig._plain")?
+        .call_method1("to_json", (value,))
+        .map_err(|e| input(format!("{argument}: not made of plain values: {e}")))?
+        .extract()
+}
+
+/// A scene from keyword arguments: a mapping of a scene's fields or a file, then single ones
+/// over it.
 pub(crate) fn scene(
     fields: Option<&Bound<'_, PyAny>>,
     gravity: Option<&Bound<'_, PyAny>>,
@@ -24,15 +38,10 @@ pub(crate) fn scene(
 ) -> PyResult<Scene> {
     let mut scene = match fields {
         None => Scene::default(),
-        Some(fields) => {
-            let text: String = fields
-                .py()
-                .import("json")?
-                .call_method1("dumps", (fields,))
-                .map_err(|e| input(format!("scene: not made of plain values: {e}")))?
-                .extract()?;
-            Scene::from_json(&text).map_err(to_py)?
-        }
+        Some(fields) => match fields.extract::<PathBuf>() {
+            Ok(path) => scene_file(&path)?,
+            Err(_) => Scene::from_json(&json_of("scene", fields)?).map_err(to_py)?,
+        },
     };
     if let Some(gravity) = gravity {
         scene.gravity = arrays::vector("gravity", gravity)?.into();
@@ -49,7 +58,50 @@ pub(crate) fn scene(
     Ok(scene)
 }
 
+fn scene_file(path: &Path) -> PyResult<Scene> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| SceneFailure::new_err(format!("cannot read {}: {e}", path.display())))?;
+    Scene::from_toml(&text).map_err(|e| {
+        let reason = to_py(e);
+        SceneFailure::new_err(format!("{}: {reason}", path.display()))
+    })
+}
+
+/// Reads a scene file (TOML) as a dictionary of all its fields, those that it leaves out as by
+/// default.
+///
+/// - `path`: the file; without one, the default scene
+///
+/// >>> scene = fabrig.read_scene()
+/// >>> scene["gravity"]
+/// [0.0, -9810.0, 0.0]
+#[pyfunction]
+#[pyo3(signature = (path=None))]
+pub(crate) fn read_scene<'py>(
+    py: Python<'py>,
+    path: Option<PathBuf>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let scene = match path {
+        Some(path) => scene_file(&path)?,
+        None => Scene::default(),
+    };
+    arrays::to_python(py, &scene)
+}
+
 /// A rig on its way through time.
+///
+/// - `rig`: what moves; `clip`: the take, at whose first frame it starts; neutral without one
+/// - `scene`: a mapping of the fields of a scene file, such as {"contact": {"pairs": "all"},
+///   "colliders": [...]}, or its path; the other arguments go before it
+/// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
+/// - `substeps`: of the cloth, per 1/60 s
+/// - `dynamics`: False leaves patches where the muscle shapes want them
+///
+/// >>> simulation = fabrig.Simulation(fabrig.rig(fabrig.demo_face()))
+/// >>> for _ in range(3):
+/// ...     report = simulation.step(1 / 60, weights={"jawOpen": 0.5})
+/// >>> simulation.vertices.shape
+/// (13082, 3)
 #[pyclass(name = "Simulation", module = "fabrig")]
 pub(crate) struct PySimulation {
     inner: Simulation,
@@ -58,10 +110,6 @@ pub(crate) struct PySimulation {
 
 #[pymethods]
 impl PySimulation {
-    /// Puts a rig into a scene, at the first frame of a clip, or neutral without one.
-    ///
-    /// `scene` is a mapping of the fields of a scene file: `{"contact": {"pairs": "all"},
-    /// "colliders": [...]}`; the other arguments go before it.
     #[new]
     #[pyo3(signature = (rig, clip=None, *, scene=None, gravity=None, wind=None, substeps=None,
                         dynamics=true))]
@@ -84,32 +132,151 @@ impl PySimulation {
         Ok(Self { inner, rig })
     }
 
-    /// Goes on by `dt` seconds: along the clip, or to weights of shape (S,) in the order of
-    /// `Rig.shape_names`. Returns a report.
-    #[pyo3(signature = (dt, *, weights=None))]
+    /// Goes on by `dt` seconds: along the clip, or to a pose that is given. Returns a report.
+    ///
+    /// - `weights`: name -> weight in [0, 1], in any spelling, or numbers of shape (S,) in the
+    ///   order of `Rig.shape_names`; without them the clip goes on
+    /// - `head`: from the head frame to the world (mm), a rigid motion of shape (4, 4)
+    /// - `eyes`: yaw and pitch of the left eye and of the right (rad), shape (4,), for scenes
+    ///   whose `eyes` are "tracked"
+    /// - `wind`: velocity of the air in the world (mm/s), shape (3,)
+    #[pyo3(signature = (dt, *, weights=None, head=None, eyes=None, wind=None))]
+    #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
         dt: f64,
         weights: Option<&Bound<'py, PyAny>>,
+        head: Option<&Bound<'py, PyAny>>,
+        eyes: Option<&Bound<'py, PyAny>>,
+        wind: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let is_given = [weights, head, eyes, wind].iter().any(Option::is_some);
         let simulation = &mut self.inner;
-        let report = match weights {
-            None => py.detach(|| simulation.advance(dt)),
-            Some(weights) => {
-                if !(dt.is_finite() && dt > 0.0) {
-                    return Err(input(format!(
-                        "dt: {dt} is not a positive number of seconds"
-                    )));
-                }
-                let pose = pose(simulation, weights, dt)?;
-                py.detach(|| simulation.advance_to(pose, dt))
+        let report = if is_given {
+            if !(dt.is_finite() && dt > 0.0) {
+                return Err(input(format!(
+                    "dt: {dt} is not a positive number of seconds"
+                )));
             }
+            let pose = pose(
+                simulation,
+                Given {
+                    weights,
+                    head,
+                    eyes,
+                    wind,
+                },
+                Some(dt),
+            )?;
+            py.detach(|| simulation.advance_to(pose, dt))
+        } else {
+            py.detach(|| simulation.advance(dt))
         };
         arrays::to_python(py, &report.map_err(to_py)?)
     }
 
-    /// Says where a collider is at the end of the next step, in place of its keys: `position`
+    /// Puts the face into a pose at once: patches on their muscle shapes, at rest.
+    ///
+    /// - `weights`, `head`, `eyes`, `wind`: as for `step`; the neutral face without them
+    #[pyo3(signature = (*, weights=None, head=None, eyes=None, wind=None))]
+    fn reset(
+        &mut self,
+        py: Python<'_>,
+        weights: Option<&Bound<'_, PyAny>>,
+        head: Option<&Bound<'_, PyAny>>,
+        eyes: Option<&Bound<'_, PyAny>>,
+        wind: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let simulation = &mut self.inner;
+        let pose = pose(
+            simulation,
+            Given {
+                weights,
+                head,
+                eyes,
+                wind,
+            },
+            None,
+        )?;
+        py.detach(|| simulation.reset(pose)).map_err(to_py)
+    }
+
+    /// Holds a pose until the face is still, or four seconds long.
+    ///
+    /// - `weights`, `head`, `eyes`, `wind`: as for `step`; the neutral face without them
+    #[pyo3(signature = (*, weights=None, head=None, eyes=None, wind=None))]
+    fn hold(
+        &mut self,
+        py: Python<'_>,
+        weights: Option<&Bound<'_, PyAny>>,
+        head: Option<&Bound<'_, PyAny>>,
+        eyes: Option<&Bound<'_, PyAny>>,
+        wind: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let simulation = &mut self.inner;
+        let pose = pose(
+            simulation,
+            Given {
+                weights,
+                head,
+                eyes,
+                wind,
+            },
+            None,
+        )?;
+        py.detach(|| hold_pose(simulation, &pose)).map_err(to_py)
+    }
+
+    /// A picture of the face now: (size, size, 3) of bytes.
+    ///
+    /// - `view`, `size`, `zoom`, `patches`, `names`, `edges`: as for `Rig.render`
+    #[pyo3(signature = (*, view="front", size=512, zoom="all", patches=false, names=false,
+                        edges=false))]
+    #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        view: &str,
+        size: u32,
+        zoom: &str,
+        patches: bool,
+        names: bool,
+        edges: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shot = Shot::new(view, size, edges)?.framed(zoom)?;
+        draw_simulation(py, &self.inner, shot, Content { patches, names })
+    }
+
+    /// Whether anything passes through anything now, by a test that shares nothing with the
+    /// solver: a mapping; None where nothing could touch.
+    fn judge_contact<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let verdict = py.detach(|| self.inner.judge_contact());
+        let verdict = verdict.map_err(|e| to_py(SceneError::from(e)))?;
+        verdict.map(|v| arrays::to_python(py, &v)).transpose()
+    }
+
+    /// All fields of the scene, as `read_scene` gives them.
+    #[getter]
+    fn scene<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        arrays::to_python(py, self.inner.scene())
+    }
+
+    /// Distance of the nodes from their muscle shapes: (root mean square, largest). (mm)
+    #[getter]
+    fn settle_error(&self) -> (f64, f64) {
+        self.inner.settle_error()
+    }
+
+    /// Puts `vertices` into an array of yours, and returns it: nothing is allocated.
+    ///
+    /// - `out`: 32- or 64-bit floats of shape (N, 3)
+    fn vertices_into<'py>(&self, out: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        arrays::into_out(&out, &self.inner.skin_in_own_units())?;
+        Ok(out)
+    }
+
+    /// Says where the collider called `name` is at the end of the next step, in place of its keys: `position`
     /// (mm) and `rotation`, an axis times an angle (rad), in the collider's own frame.
     #[pyo3(signature = (name, position, *, rotation=None))]
     fn set_collider(
@@ -211,32 +378,60 @@ impl PySimulation {
     /// From the head frame to the world (mm), shape (4, 4).
     #[getter]
     fn head<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let matrix = self.inner.head().to_homogeneous();
-        Array2::from_shape_fn((4, 4), |(row, column)| matrix[(row, column)]).into_pyarray(py)
+        arrays::from_matrix(py, &self.inner.head().to_homogeneous())
     }
 }
 
-/// The pose with these weights, reached from the present one in `dt`.
-fn pose(simulation: &Simulation, weights: &Bound<'_, PyAny>, dt: f64) -> PyResult<FacePose> {
-    let values = arrays::numbers("weights", weights)?;
-    let now = &simulation.pose().weights;
-    if values.len() != now.len() {
-        return Err(input(format!(
-            "weights: expected shape ({},), got ({},)",
-            now.len(),
-            values.len()
-        )));
+/// What of a pose a caller gave.
+struct Given<'a, 'py> {
+    weights: Option<&'a Bound<'py, PyAny>>,
+    head: Option<&'a Bound<'py, PyAny>>,
+    eyes: Option<&'a Bound<'py, PyAny>>,
+    wind: Option<&'a Bound<'py, PyAny>>,
+}
+
+/// The pose that is given, reached from the present one in `dt`, or at rest.
+fn pose(simulation: &Simulation, given: Given<'_, '_>, dt: Option<f64>) -> PyResult<FacePose> {
+    let now = simulation.pose();
+    let mut pose = FacePose::neutral(now.weights.len());
+    if let Some(weights) = given.weights {
+        pose.weights = weights_of("weights", weights, &simulation.rig().shape_names)?;
     }
-    if let Some(index) = values.iter().position(|w| !(0.0..=1.0).contains(w)) {
-        return Err(input(format!(
-            "weights: {} at index {index} is outside [0, 1]",
-            values[index]
-        )));
+    if let Some(dt) = dt {
+        let change = pose.weights.iter().zip(&now.weights);
+        pose.rates = change
+            .map(|(&to, &from)| (f64::from(to - from) / dt) as f32)
+            .collect();
     }
-    let mut pose = FacePose::neutral(now.len());
-    for (shape, &value) in values.iter().enumerate() {
-        pose.weights[shape] = value as f32;
-        pose.rates[shape] = ((value - f64::from(now[shape])) / dt) as f32;
+    if let Some(head) = given.head {
+        pose.head = arrays::rigid("head", head)?;
     }
+    if let Some(eyes) = given.eyes {
+        let angles = arrays::numbers("eyes", eyes)?;
+        let &[left_yaw, left_pitch, right_yaw, right_pitch] = &angles[..] else {
+            return Err(input(format!(
+                "eyes: expected shape (4,), got ({},)",
+                angles.len()
+            )));
+        };
+        if angles.iter().any(|a| !a.is_finite()) {
+            return Err(input("eyes: expected finite angles"));
+        }
+        pose.eyes = Some([
+            EyeAngles {
+                yaw: left_yaw,
+                pitch: left_pitch,
+            },
+            EyeAngles {
+                yaw: right_yaw,
+                pitch: right_pitch,
+            },
+        ]);
+    }
+    let still = simulation.scene().wind.cast::<f64>();
+    pose.wind = match given.wind {
+        Some(wind) => Vector3::from(arrays::vector("wind", wind)?).cast(),
+        None => still,
+    };
     Ok(pose)
 }

@@ -8,7 +8,7 @@ use super::{Collider, CollisionError, collider_mesh};
 use crate::mesh::triangle_edges;
 
 /// Crossings among everything that may collide.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Verdict {
     /// Crossings of patches with each other and themselves.
     pub cloth: usize,

@@ -17,6 +17,14 @@ pub enum RenderError {
         /// The longest side allowed.
         limit: u32,
     },
+    /// Pixels do not fill a picture.
+    #[error("expected {expected} bytes, three per pixel, got {found}")]
+    ByteCount {
+        /// How many are needed.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
     /// Nothing was added, so there is nothing to frame.
     #[error("the picture shows nothing: no layer has a triangle and no points were added")]
     Empty,

@@ -38,6 +38,27 @@ impl Image {
         })
     }
 
+    /// A picture from its pixels: red, green, blue, row after row.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Size`] as [`Self::filled`], [`RenderError::ByteCount`].
+    pub fn from_bytes(width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, RenderError> {
+        check_size(width, height)?;
+        let expected = 3 * width as usize * height as usize;
+        if pixels.len() != expected {
+            return Err(RenderError::ByteCount {
+                expected,
+                found: pixels.len(),
+            });
+        }
+        Ok(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+
     /// Pixels across.
     pub fn width(&self) -> u32 {
         self.width

@@ -1,22 +1,37 @@
 """A physical face rig from one neutral mesh.
 
 >>> import fabrig
->>> face = fabrig.demo_face()
->>> rig = fabrig.rig(face.vertices, face.faces)
->>> report = fabrig.animate(rig, fabrig.demo_take(), "demo.mcap")
+>>> rig = fabrig.rig(fabrig.demo_face())
+>>> report = fabrig.animate(rig, fabrig.demo_take().between(0, 0.2), "demo.mcap")
+
+Lengths are in millimetres at true head size unless they are said to be the mesh's own, times in
+seconds; +Y is up, +Z out of the face, the character's left is +X. What fabrig refuses is a
+`FabrigError`.
 """
 
+from . import bench
 from ._fabrig import (
+    ARKIT_SHAPES,
+    CheckError,
     Clip,
     Cloth,
+    ClothError,
+    EditError,
+    Edits,
     ExportError,
     FabrigError,
     InputError,
+    LandmarkError,
     Mesh,
     MeshError,
     MotionError,
+    RecordedFrame,
+    Recording,
     RecordingError,
+    Registration,
     RegistrationError,
+    RenderError,
+    RetargetError,
     Rig,
     RigError,
     SceneError,
@@ -24,28 +39,48 @@ from ._fabrig import (
     Template,
     TemplateError,
     __version__,
+    action_units,
     animate,
     convert,
     demo_face,
     demo_take,
+    parse_motion,
     read_mesh,
     read_motion,
+    read_scene,
     read_shapes,
+    register,
+    retarget,
     rig,
     template,
+    weights_of_units,
+    write_gif,
+    write_png,
 )
+from ._rerun import log_to_rerun
 
 __all__ = [
+    "ARKIT_SHAPES",
+    "CheckError",
     "Clip",
     "Cloth",
+    "ClothError",
+    "EditError",
+    "Edits",
     "ExportError",
     "FabrigError",
     "InputError",
+    "LandmarkError",
     "Mesh",
     "MeshError",
     "MotionError",
+    "RecordedFrame",
+    "Recording",
     "RecordingError",
+    "Registration",
     "RegistrationError",
+    "RenderError",
+    "RetargetError",
     "Rig",
     "RigError",
     "SceneError",
@@ -53,13 +88,23 @@ __all__ = [
     "Template",
     "TemplateError",
     "__version__",
+    "action_units",
     "animate",
+    "bench",
     "convert",
     "demo_face",
     "demo_take",
+    "log_to_rerun",
+    "parse_motion",
     "read_mesh",
     "read_motion",
+    "read_scene",
     "read_shapes",
+    "register",
+    "retarget",
     "rig",
     "template",
+    "weights_of_units",
+    "write_gif",
+    "write_png",
 ]

@@ -1,32 +1,49 @@
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from os import PathLike
-from typing import Any, TypedDict
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path as _PathObject
+from typing import Any, TypeVar, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Self
+
+from ._types import (
+    CheckReport,
+    Faces,
+    Landmarks,
+    MaterialLike,
+    Path,
+    Picture,
+    Pose,
+    Progress,
+    SceneLike,
+)
 
 __version__: str
+ARKIT_SHAPES: tuple[str, ...]
 
 class FabrigError(Exception): ...
 class InputError(FabrigError): ...
 class MeshError(FabrigError): ...
 class TemplateError(FabrigError): ...
 class RegistrationError(FabrigError): ...
+class LandmarkError(RegistrationError): ...
 class RigError(FabrigError): ...
+class EditError(RigError): ...
+class CheckError(RigError): ...
 class MotionError(FabrigError): ...
+class RetargetError(FabrigError): ...
 class SceneError(FabrigError): ...
-class ExportError(FabrigError): ...
+class ClothError(SceneError): ...
 class RecordingError(FabrigError): ...
+class ExportError(FabrigError): ...
+class RenderError(FabrigError): ...
 
-Faces = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
-Path = str | PathLike[str]
-Progress = Callable[[str, float], object]
+_Out = TypeVar("_Out", NDArray[np.float32], NDArray[np.float64])
 
-MaterialLike = str | Mapping[str, float | str]
-
+@final
 class Cloth:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         grids: Iterable[ArrayLike],
         *,
         material: MaterialLike | Sequence[MaterialLike] | None = None,
@@ -41,7 +58,7 @@ class Cloth:
         standing_gravity: ArrayLike | None = None,
         precision: str | None = None,
         integrator: str | None = None,
-    ) -> None: ...
+    ) -> Self: ...
     def step(
         self,
         dt: float,
@@ -64,28 +81,119 @@ class Cloth:
     @property
     def patch_count(self) -> int: ...
 
+@final
 class Mesh:
-    def __init__(self, vertices: ArrayLike, faces: Faces) -> None: ...
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        faces: Faces,
+        *,
+        uvs: tuple[ArrayLike, ArrayLike] | None = None,
+        groups: Sequence[tuple[str, tuple[int, int]]] | None = None,
+    ) -> Self: ...
+    @staticmethod
+    def of(source: Any) -> Mesh: ...
     @property
     def vertices(self) -> NDArray[np.float64]: ...
     @property
     def faces(self) -> list[list[int]]: ...
     @property
     def triangles(self) -> NDArray[np.uint32]: ...
+    @property
+    def polygons(self) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
+    @property
+    def uvs(self) -> tuple[NDArray[np.float32], NDArray[np.uint32]] | None: ...
+    @property
+    def groups(self) -> list[tuple[str, tuple[int, int]]]: ...
+    @property
+    def normals(self) -> NDArray[np.float64]: ...
+    def with_vertices(self, vertices: ArrayLike) -> Mesh: ...
     def write_obj(self, path: Path) -> None: ...
+    def render(
+        self, *, view: str = "front", size: int = 512, edges: bool = False
+    ) -> Picture: ...
+    def to_trimesh(self) -> Any: ...
+    def to_meshio(self) -> Any: ...
+    def to_pyvista(self) -> Any: ...
+    def plot(self, *, scalars: ArrayLike | None = None, **options: Any) -> Any: ...
+    @staticmethod
+    def _from_bytes(bytes: bytes) -> Mesh: ...
+    def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
+@final
 class Template:
+    @staticmethod
+    def load(folder: Path) -> Template: ...
+    @staticmethod
+    def build(
+        source: Path,
+        folder: Path,
+        *,
+        name: str | None = None,
+        credit: str = "",
+        landmarks: Landmarks | None = None,
+        landmarks_order: str | None = None,
+        progress: Progress = None,
+    ) -> tuple[Template, dict[str, Any]]: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def credit(self) -> str: ...
     @property
     def mesh(self) -> Mesh: ...
     @property
     def landmarks(self) -> dict[str, int]: ...
     @property
     def regions(self) -> list[str]: ...
+    @property
+    def shape_names(self) -> list[str]: ...
+    def shape(self, name: str) -> NDArray[np.float64]: ...
+    def render(
+        self,
+        pose: Pose | None = None,
+        *,
+        view: str = "front",
+        size: int = 512,
+        zoom: str = "all",
+        edges: bool = False,
+    ) -> Picture: ...
 
+@final
+class Registration:
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+    @property
+    def to_head(self) -> NDArray[np.float64]: ...
+    @property
+    def distances(self) -> NDArray[np.float64]: ...
+    @property
+    def is_part(self) -> NDArray[np.bool_]: ...
+
+@final
+class Edits:
+    def __new__(cls, edits: Mapping[str, Any] | None = None) -> Self: ...
+    @staticmethod
+    def load(path: Path) -> Edits: ...
+    @staticmethod
+    def beside(rig: Path) -> Edits: ...
+    @staticmethod
+    def path_of(rig: Path) -> _PathObject: ...
+    def save(self, path: Path) -> None: ...
+    def to_text(self) -> str: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def sculpt(self, rig: Rig, shape: str, vertices: ArrayLike | Mesh) -> int: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
 class Rig:
     @staticmethod
     def load(path: Path, *, edits: bool = True) -> Rig: ...
-    def with_edits(self, path: Path) -> Rig: ...
+    def with_edits(self, edits: Edits | Mapping[str, Any] | Path) -> Rig: ...
     def save(self, path: Path) -> None: ...
     def export(
         self,
@@ -102,9 +210,31 @@ class Rig:
         components: int | None = None,
         tolerance: float | None = None,
         check: bool = True,
-        scene: Mapping[str, Any] | None = None,
-        progress: Progress | None = None,
+        scene: SceneLike | None = None,
+        progress: Progress = None,
     ) -> dict[str, Any]: ...
+    def check(
+        self,
+        *,
+        gates: Mapping[str, float] | None = None,
+        template: Template | Path | None = None,
+        contact: bool = False,
+        progress: Progress = None,
+    ) -> CheckReport: ...
+    def weights(self, pose: Pose) -> NDArray[np.float32]: ...
+    def expressions(self, sheet: str = "motion") -> dict[str, NDArray[np.float32]]: ...
+    def render(
+        self,
+        pose: Pose | None = None,
+        *,
+        view: str = "front",
+        size: int = 512,
+        zoom: str = "all",
+        patches: bool = False,
+        names: bool = False,
+        edges: bool = False,
+        dynamics: bool = True,
+    ) -> Picture: ...
     @property
     def mesh(self) -> Mesh: ...
     @property
@@ -112,9 +242,13 @@ class Rig:
     @property
     def shape_names(self) -> list[str]: ...
     @property
+    def muscle_shapes(self) -> list[str]: ...
+    def muscle_shape(self, name: str) -> Mesh: ...
+    @property
     def alphas(self) -> dict[str, float]: ...
     @property
     def patch_names(self) -> list[str]: ...
+    def patch(self, name: str) -> NDArray[np.float64]: ...
     @property
     def node_count(self) -> int: ...
     @property
@@ -123,65 +257,40 @@ class Rig:
     def to_head(self) -> NDArray[np.float64]: ...
     @property
     def report(self) -> dict[str, Any]: ...
-    def check(
-        self,
-        *,
-        gates: Mapping[str, float] | None = None,
-        template: Path | None = None,
-        progress: Progress | None = None,
-    ) -> CheckReport: ...
+    @property
+    def template(self) -> str: ...
+    @property
+    def regions(self) -> list[str | None]: ...
+    @property
+    def parts(self) -> dict[str, NDArray[np.uint32]]: ...
+    @staticmethod
+    def _from_bytes(bytes: bytes) -> Rig: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
-class ShapeCheck(TypedDict):
-    shape: str
-    over: str | None
-    amplitude_mm: float
-    parts_mm: float
-    template_mm: float
-    ratio: float | None
-    direction: float | None
-    wrong_side: int
-    torn_edges: int
-    leak_mm: float | None
-    flipped: int
-    area_ratios: list[float]
-    lip_crossings: int
-    lip_depth_mm: float
-    lid_crossings: int
-    lid_depth_mm: float
-
-class CheckFinding(TypedDict):
-    gate: str
-    shape: str | None
-    value: float
-    limit: float
-    vertex: int | None
-    text: str
-
-class CheckReport(TypedDict):
-    passes: bool
-    template: str
-    skin_vertices: int
-    size: float
-    gates: dict[str, float]
-    shapes: list[ShapeCheck]
-    muscles: list[dict[str, Any]]
-    distance: dict[str, float]
-    regions: list[dict[str, Any]]
-    findings: list[CheckFinding]
-    notes: list[str]
-    distances: NDArray[np.float64]
-    marked: dict[str, list[int]]
-
+@final
 class Clip:
-    def __init__(
-        self, times: ArrayLike, channels: Sequence[str], weights: ArrayLike
-    ) -> None: ...
+    def __new__(
+        cls,
+        times: ArrayLike,
+        channels: Sequence[str],
+        weights: ArrayLike,
+        *,
+        head: ArrayLike | None = None,
+        eyes: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> Self: ...
     @property
     def times(self) -> NDArray[np.float64]: ...
     @property
     def channels(self) -> list[str]: ...
     @property
     def weights(self) -> NDArray[np.float32]: ...
+    @property
+    def head(self) -> NDArray[np.float64] | None: ...
+    @property
+    def eyes(self) -> NDArray[np.float64] | None: ...
+    @property
+    def wind(self) -> NDArray[np.float64] | None: ...
     @property
     def duration(self) -> float: ...
     @property
@@ -190,22 +299,62 @@ class Clip:
     def notes(self) -> dict[str, Any]: ...
     def sample(self, time: float) -> NDArray[np.float32]: ...
     def resampled(self, rate: float) -> Clip: ...
+    def between(self, start: float, end: float) -> Clip: ...
     def to_csv(self) -> str: ...
+    def save(self, path: Path) -> None: ...
+    @staticmethod
+    def _from_bytes(bytes: bytes) -> Clip: ...
     def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
+@final
 class Simulation:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         rig: Rig,
         clip: Clip | None = None,
         *,
-        scene: Mapping[str, Any] | None = None,
+        scene: SceneLike | None = None,
         gravity: ArrayLike | None = None,
         wind: ArrayLike | None = None,
         substeps: int | None = None,
         dynamics: bool = True,
+    ) -> Self: ...
+    def step(
+        self,
+        dt: float,
+        *,
+        weights: Pose | None = None,
+        head: ArrayLike | None = None,
+        eyes: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> dict[str, Any]: ...
+    def reset(
+        self,
+        *,
+        weights: Pose | None = None,
+        head: ArrayLike | None = None,
+        eyes: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
     ) -> None: ...
-    def step(self, dt: float, *, weights: ArrayLike | None = None) -> dict[str, Any]: ...
+    def hold(
+        self,
+        *,
+        weights: Pose | None = None,
+        head: ArrayLike | None = None,
+        eyes: ArrayLike | None = None,
+        wind: ArrayLike | None = None,
+    ) -> None: ...
+    def render(
+        self,
+        *,
+        view: str = "front",
+        size: int = 512,
+        zoom: str = "all",
+        patches: bool = False,
+        names: bool = False,
+        edges: bool = False,
+    ) -> Picture: ...
     def set_collider(
         self, name: str, position: ArrayLike, *, rotation: ArrayLike | None = None
     ) -> None: ...
@@ -215,12 +364,18 @@ class Simulation:
     def contact(self) -> dict[str, Any] | None: ...
     @property
     def contact_points(self) -> NDArray[np.float32]: ...
+    def judge_contact(self) -> dict[str, int] | None: ...
+    @property
+    def scene(self) -> dict[str, Any]: ...
+    @property
+    def settle_error(self) -> tuple[float, float]: ...
     @property
     def time(self) -> float: ...
     @property
     def rig(self) -> Rig: ...
     @property
     def vertices(self) -> NDArray[np.float64]: ...
+    def vertices_into(self, out: _Out) -> _Out: ...
     @property
     def skin(self) -> NDArray[np.float32]: ...
     @property
@@ -228,6 +383,35 @@ class Simulation:
     @property
     def head(self) -> NDArray[np.float64]: ...
     def patch(self, name: str) -> NDArray[np.float32]: ...
+
+@final
+class RecordedFrame:
+    @property
+    def time(self) -> float: ...
+    @property
+    def head(self) -> NDArray[np.float64]: ...
+    @property
+    def surfaces(self) -> dict[str, NDArray[np.float64]]: ...
+    @property
+    def triangles(self) -> dict[str, NDArray[np.uint32]]: ...
+    @property
+    def patch_names(self) -> list[str]: ...
+    def render(
+        self,
+        *,
+        view: str = "front",
+        size: int = 512,
+        patches: bool = False,
+        edges: bool = False,
+    ) -> Picture: ...
+
+@final
+class Recording:
+    def __new__(cls, path: Path, *, recover: bool = False) -> Self: ...
+    @property
+    def metadata(self) -> dict[str, str]: ...
+    def __iter__(self) -> Recording: ...
+    def __next__(self) -> RecordedFrame: ...
 
 def read_mesh(path: Path) -> Mesh: ...
 def read_shapes(path: Path) -> dict[str, NDArray[np.float64]]: ...
@@ -239,37 +423,63 @@ def read_motion(
     *,
     format: str | None = None,
     frame_rate: float | None = None,
+    milliseconds: bool = False,
     ignore_unknown_columns: bool = False,
     clamp_weights: bool = False,
     calibrate_neutral: tuple[float, float] | None = None,
     gains: Mapping[str, float] | None = None,
     swap_sides: bool = False,
+    keep_mouth_close: bool = False,
+    resample: float | None = None,
 ) -> Clip: ...
+def parse_motion(text: str, *, frame_rate: float | None = None) -> Clip: ...
+def read_scene(path: Path | None = None) -> dict[str, Any]: ...
+def action_units() -> dict[str, str]: ...
+def weights_of_units(units: Mapping[str, float]) -> dict[str, float]: ...
+def register(
+    mesh: Any,
+    *,
+    landmarks: Landmarks | None = None,
+    landmarks_order: str | None = None,
+    unit: str | float | None = None,
+    min_confidence: float | None = None,
+    template: Template | Path | None = None,
+    progress: Progress = None,
+) -> Registration: ...
 def rig(
-    vertices: ArrayLike | Mesh,
+    vertices: Any,
     faces: Faces | None = None,
     *,
-    landmarks: Mapping[str, Sequence[float]] | None = None,
-    unit_mm: float | None = None,
+    landmarks: Landmarks | None = None,
+    landmarks_order: str | None = None,
+    unit: str | float | None = None,
+    min_confidence: float | None = None,
     cut_seams: Sequence[str] | None = None,
-    expressions: Mapping[str, ArrayLike] | None = None,
+    expressions: Mapping[str, ArrayLike] | Path | None = None,
     alpha: str = "own",
     offsets: str = "global",
-    template: Path | None = None,
-    progress: Progress | None = None,
+    template: Template | Path | None = None,
+    progress: Progress = None,
 ) -> Rig: ...
 def animate(
     rig: Rig,
     clip: Clip,
     output: Path,
     *,
-    scene: Mapping[str, Any] | None = None,
+    scene: SceneLike | None = None,
     fps: float | None = None,
     gravity: ArrayLike | None = None,
     wind: ArrayLike | None = None,
     substeps: int | None = None,
     dynamics: bool = True,
-    progress: Progress | None = None,
+    skin_hz: float | None = None,
+    patches_hz: float | None = None,
+    points_hz: float | None = None,
+    strain_hz: float | None = None,
+    rig_name: str | None = None,
+    take_name: str | None = None,
+    layout: Path | None = None,
+    progress: Progress = None,
 ) -> dict[str, Any]: ...
 def convert(
     recording: Path,
@@ -282,5 +492,45 @@ def convert(
     still_head: bool = False,
     components: int | None = None,
     tolerance: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
+) -> dict[str, Any]: ...
+def retarget(
+    source: ArrayLike | Path,
+    rig: Rig,
+    *,
+    markers: Sequence[str] | None = None,
+    fps: float = 30.0,
+    units: Sequence[int] | None = None,
+    neutral: tuple[float, float] | None = None,
+    places: Mapping[str, str] | None = None,
+    still_head: bool = False,
+    noise: float | None = None,
+) -> tuple[Clip, dict[str, Any]]: ...
+def write_gif(path: Path, pictures: Sequence[Picture], *, fps: float = 15.0) -> None: ...
+def write_png(path: Path, picture: Picture) -> None: ...
+def bench_chain(cloth: bool) -> list[dict[str, Any]]: ...
+def bench_pareto(
+    rig: Rig | None,
+    clip: Clip,
+    ratio: float | None,
+    frames: int | None,
+    substeps: list[int] | None,
+    reference_substeps: int,
+    full: bool,
+    progress: Progress,
+) -> dict[str, Any]: ...
+def bench_registration(
+    filter: str, count: int | None, progress: Progress
+) -> list[dict[str, Any]]: ...
+def bench_registration_cost(largest: int, progress: Progress) -> list[dict[str, Any]]: ...
+def bench_runtime(
+    rig: Rig | None, clip: Clip, frames: int, progress: Progress
+) -> dict[str, Any]: ...
+def bench_stability(rig: Rig | None, full: bool, progress: Progress) -> list[dict[str, Any]]: ...
+def bench_table3(
+    faces: list[tuple[str, Any, Any]] | None,
+    filter: str,
+    methods: list[str] | None,
+    template: Template | Path | None,
+    progress: Progress,
 ) -> dict[str, Any]: ...
