@@ -32,7 +32,8 @@ rm -rf "$target/wheels"
 "$python" -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
 # Khronos' glTF validator is a package of Node's, which requirements.txt brings.
 "$target/venv/bin/npm" install --silent --no-fund --prefix "$target/gltf-validator" gltf-validator@2.0.0-dev.3.10
-export FABRIG_GLTF_VALIDATOR
+export FABRIG_GLTF_VALIDATOR FABRIG_WHEEL
+FABRIG_WHEEL=$(realpath "$target"/wheels/*.whl)
 FABRIG_GLTF_VALIDATOR=$(realpath "$target/gltf-validator")
 "$python" -m pytest -q crates/fabrig-py/tests tests
 "$python" benches/peers/run.py --smoke --json "$target/peers.json"
