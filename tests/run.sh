@@ -35,5 +35,6 @@ rm -rf "$target/wheels"
 export FABRIG_GLTF_VALIDATOR FABRIG_WHEEL
 FABRIG_WHEEL=$(realpath "$target"/wheels/*.whl)
 FABRIG_GLTF_VALIDATOR=$(realpath "$target/gltf-validator")
+"$python" -W error -m pdoc -o "$target/python-docs" fabrig
 "$python" -m pytest -q crates/fabrig-py/tests tests
 "$python" benches/peers/run.py --smoke --json "$target/peers.json"

@@ -39,8 +39,8 @@ type PairArgument = (u32, u32, Vec<(u32, u32)>, f64);
 ///   `anchor_strength` times the strength of attachments
 /// - `pairs`: tuples (patch, other patch, (K, 2) node indices, strength) held to each other
 /// - `substeps`: per 1/60 s; `rest_blend`: 0 keeps rest lengths (wrinkles), 1 takes the targets'
-/// - `rest_imperfection`: smooth waves put on the rest shape (mm), so that wrinkles come out the
-///   same again; `seed` makes others
+/// - `rest_imperfection`: how much `rest_blend` varies from edge to edge, which decides how a
+///   smooth patch buckles; `seed` makes other variations
 /// - `standing_gravity`: gravity under which rest is at equilibrium (mm/s^2)
 /// - `precision`: "single", "single_scalar" or "double"; `integrator`: "bdf2" or
 ///   "backward_euler"

@@ -75,10 +75,18 @@ impl Shot {
                 layer
             }
         });
-        let mut picture = Picture::new(self.size, self.size)
+        // Names stand beside what they name.
+        let width = if labels.is_empty() {
+            self.size
+        } else {
+            self.size * 8 / 5
+        };
+        let mut picture = Picture::new(width, self.size)
             .with_view(self.view)
-            .with_layers(layers)
-            .with_labels(labels);
+            .with_layers(layers);
+        if !labels.is_empty() {
+            picture = picture.with_margins(0.05, 0.04).with_labels(labels);
+        }
         if !focus.is_empty() {
             picture = picture.with_focus(focus);
         }

@@ -211,7 +211,8 @@ impl PyRig {
     ///   degrees
     /// - `size`: pixels to each side
     /// - `zoom`: "all", "face", "mouth", "eyes" or "eye"
-    /// - `patches`: muscles and fat instead of the skin; `names`: with their names
+    /// - `patches`: muscles and fat instead of the skin; `names`: with their names beside them, in
+    ///   a picture that is 8/5 as wide
     /// - `edges`: whether the edges of faces are drawn
     /// - `dynamics`: whether the cloth settles, or the patches stand where the shapes want them
     ///

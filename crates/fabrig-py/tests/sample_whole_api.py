@@ -224,7 +224,8 @@ def pictures(rig: fabrig.Rig, folder: Path) -> None:
     template = fabrig.template()
     drawn = template.render({"mouthSmile": 1}, size=48, zoom="mouth")
     now = fabrig.Simulation(rig, dynamics=False).render(size=48, view="side", edges=True)
-    all_of_them = [mesh, posed, muscles, drawn, now]
+    assert muscles.shape == (48, 76, 3)
+    all_of_them = [mesh, posed, drawn, now]
     assert all(p.shape == (48, 48, 3) and p.std() > 5 for p in all_of_them)
     fabrig.write_png(folder / "face.png", posed)
     fabrig.write_gif(folder / "faces.gif", all_of_them, fps=4)

@@ -71,3 +71,26 @@ def test_the_readme_leaves_a_recording(tmp_path, monkeypatch):
     readme = dict(blocks())["README.md"]
     exec(compile(readme[0], "README.md", "exec"), {})
     assert any(path.suffix == ".mcap" for path in tmp_path.iterdir())
+
+
+def test_the_scene_in_the_formats_is_the_default_one(tmp_path):
+    text = (DOCUMENTS / "docs/formats.md").read_text()
+    (scene,) = re.findall(r"```toml\n(.*?)```", text, re.S)
+    (tmp_path / "scene.toml").write_text(scene)
+    assert fabrig.read_scene(tmp_path / "scene.toml") == fabrig.read_scene()
+
+
+def test_edits_in_the_guide_are_accepted(rig, tmp_path):
+    text = (DOCUMENTS / "docs/guide/4_edit.md").read_text()
+    (edits,) = re.findall(r"```toml\n(.*?)```", text, re.S)
+    (tmp_path / "face.edits.toml").write_text(edits)
+    assert rig.with_edits(tmp_path / "face.edits.toml").alphas["malar_fat_l"] == 1.2
+
+
+def test_links_in_documents_lead_somewhere():
+    wrong = []
+    for path in [*DOCUMENTS.glob("*.md"), *DOCUMENTS.glob("docs/**/*.md")]:
+        for target in re.findall(r"\]\(([^)#\s]+)", path.read_text()):
+            if "://" not in target and not (path.parent / target).exists():
+                wrong.append(f"{path.relative_to(DOCUMENTS)}: {target}")
+    assert wrong == []

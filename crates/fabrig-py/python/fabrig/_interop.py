@@ -63,7 +63,8 @@ def _of_meshio(source: Any) -> Mesh:
 
 
 def _of_pyvista(source: Any) -> Mesh:
-    surface = source if hasattr(source, "n_faces_strict") else source.extract_surface()
+    is_surface = isinstance(source, _needed("pyvista", "pyvista").PolyData)
+    surface = source if is_surface else source.extract_surface()
     flat, faces, at = np.asarray(surface.faces), [], 0
     while at < len(flat):
         count = int(flat[at])
