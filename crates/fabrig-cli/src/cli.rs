@@ -1,7 +1,9 @@
 //! The command line as types.
 
+mod batch;
 mod export;
 
+pub(crate) use batch::{BatchArgs, BenchBatchArgs, BenchOutput};
 pub(crate) use export::{ConvertArgs, ExportArgs, LayoutArgs, Target};
 
 use fabrig_core::transfer::{AlphaMode, OffsetMode};
@@ -36,6 +38,9 @@ pub(crate) enum Command {
     Export(ExportArgs),
     /// Write a recording for other programs
     Convert(ConvertArgs),
+    /// Many faces times many takes, as a manifest says; does only what is missing or changed; exit
+    /// code 3 where something could not be made
+    Batch(BatchArgs),
     /// Fit the shapes of a rig to markers or an animated mesh, and write the take
     Retarget(RetargetArgs),
     /// Look at and change single muscles of a rig
@@ -632,6 +637,8 @@ pub(crate) enum BenchCommand {
     Registration(BenchRegistrationArgs),
     /// The cloth solver's time beside its error: modes, substeps, sweeps, stiffness ratios
     Pareto(BenchParetoArgs),
+    /// Faces times takes with one worker and with two: time, throughput, equal bytes
+    Batch(BenchBatchArgs),
     /// What a frame costs: faces simple and complex, with and without skin and recording, and
     /// cloth from 2,000 to 200,000 nodes
     Runtime(BenchRuntimeArgs),

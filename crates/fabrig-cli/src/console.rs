@@ -52,11 +52,33 @@ impl Console {
 
     /// Shows `done` of `total`, and says whether to go on.
     pub(crate) fn show(&self, stage: &str, done: u64, total: u64, detail: &str) -> ControlFlow<()> {
+        const TEMPLATE: &str = "{prefix:>10} {wide_bar} {percent:>3}% {msg} {eta}";
+        self.draw(TEMPLATE, stage, done, total, detail)
+    }
+
+    /// As [`Self::show`], where `detail` says itself how long the rest takes.
+    pub(crate) fn show_with(
+        &self,
+        stage: &str,
+        done: u64,
+        total: u64,
+        detail: &str,
+    ) -> ControlFlow<()> {
+        const TEMPLATE: &str = "{prefix:>10} {wide_bar} {percent:>3}% {msg}";
+        self.draw(TEMPLATE, stage, done, total, detail)
+    }
+
+    fn draw(
+        &self,
+        template: &str,
+        stage: &str,
+        done: u64,
+        total: u64,
+        detail: &str,
+    ) -> ControlFlow<()> {
         if self.bar.length() != Some(total) {
             self.bar.set_length(total);
-            if let Ok(style) =
-                ProgressStyle::with_template("{prefix:>10} {wide_bar} {percent:>3}% {msg} {eta}")
-            {
+            if let Ok(style) = ProgressStyle::with_template(template) {
                 self.bar.set_style(style);
             }
         }

@@ -47,5 +47,7 @@ pub enum Error {
     #[error(transparent)]
     Render(#[from] crate::render::RenderError),
     #[error(transparent)]
+    Batch(#[from] crate::batch::BatchError),
+    #[error(transparent)]
     Recording(#[from] crate::recording::RecordingError),
 }

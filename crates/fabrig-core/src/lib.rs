@@ -20,6 +20,7 @@
 
 pub mod anatomy;
 pub mod atomic_file;
+pub mod batch;
 pub mod cloth;
 pub mod collision;
 pub mod edit;

@@ -1,6 +1,8 @@
 //! One file per verb.
 
 mod animate;
+mod batch;
+mod batch_page;
 mod bench;
 mod check;
 mod contact_pictures;
@@ -46,6 +48,7 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
         Command::Check(args) => check::run(console, &args),
         Command::Export(args) => export::run(console, &args),
         Command::Convert(args) => convert::run(console, &args),
+        Command::Batch(args) => batch::run(console, &args),
         Command::Retarget(args) => retarget::run(console, &args),
         Command::Edit(command) => edit::run(console, &command),
         Command::Render(args) => render::run(console, &args),

@@ -26,6 +26,8 @@ mod usda;
 mod usda_text;
 mod writer;
 
+pub(crate) use npz::{Elements, NpzWriter};
+
 pub use convert::{ConvertOptions, convert};
 pub use error::ExportError;
 pub use format::ExportFormat;

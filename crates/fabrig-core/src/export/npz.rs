@@ -10,7 +10,7 @@ use zip::{CompressionMethod, ZipWriter};
 use super::face::{ExportFace, Frame, Shape, WeightAnimation, single};
 
 /// Elements of an array.
-pub(super) enum Elements<'a> {
+pub(crate) enum Elements<'a> {
     F32(&'a [f32]),
     F64(&'a [f64]),
     U32(&'a [u32]),
@@ -19,12 +19,12 @@ pub(super) enum Elements<'a> {
 }
 
 /// An archive on its way.
-pub(super) struct NpzWriter<W: Write> {
+pub(crate) struct NpzWriter<W: Write> {
     zip: ZipWriter<StreamWriter<W>>,
 }
 
 impl<W: Write> NpzWriter<W> {
-    pub(super) fn new(out: W) -> Self {
+    pub(crate) fn new(out: W) -> Self {
         Self {
             zip: ZipWriter::new_stream(out),
         }
@@ -54,7 +54,7 @@ impl<W: Write> NpzWriter<W> {
         self.zip.write_all(header.as_bytes())
     }
 
-    pub(super) fn array(
+    pub(crate) fn array(
         &mut self,
         name: &str,
         shape: &[usize],
@@ -91,17 +91,17 @@ impl<W: Write> NpzWriter<W> {
     }
 
     /// Begins an array of 32-bit floats whose values are given bit by bit.
-    pub(super) fn begin_floats(&mut self, name: &str, shape: &[usize]) -> io::Result<()> {
+    pub(crate) fn begin_floats(&mut self, name: &str, shape: &[usize]) -> io::Result<()> {
         self.begin(name, "<f4", shape)
     }
 
     /// More of the array begun.
-    pub(super) fn values(&mut self, values: &[f32]) -> io::Result<()> {
+    pub(crate) fn values(&mut self, values: &[f32]) -> io::Result<()> {
         let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         self.zip.write_all(&bytes)
     }
 
-    pub(super) fn finish(self) -> io::Result<()> {
+    pub(crate) fn finish(self) -> io::Result<()> {
         self.zip.finish()?;
         Ok(())
     }

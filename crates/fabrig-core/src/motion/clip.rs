@@ -47,6 +47,18 @@ pub enum ClipError {
         /// Its name.
         channel: String,
     },
+    /// A cut that leaves nothing of the clip.
+    #[error("the take lasts from {start} to {end} s; nothing of it is from {from} to {to} s")]
+    Cut {
+        /// Where the cut begins. (s)
+        from: f64,
+        /// Where it ends. (s)
+        to: f64,
+        /// Where the clip begins. (s)
+        start: f64,
+        /// Where it ends. (s)
+        end: f64,
+    },
     /// A frame rate that no take has.
     #[error("{found} frames per second are asked for; a take has 1 to 240")]
     Rate {
@@ -324,6 +336,30 @@ impl Clip {
         let steps = (self.duration() * rate + 1e-6).floor() as usize;
         let start = self.times[0];
         Ok(self.sampled_at((0..=steps).map(|i| start + i as f64 / rate).collect()))
+    }
+
+    /// The part of the clip from `from` to `to` (s on the clip's own time axis, as far as it
+    /// goes): its frames there, and one at each end.
+    ///
+    /// # Errors
+    ///
+    /// [`ClipError::Cut`] where that is less than two frames of a clip that has them.
+    pub fn cut(&self, from: f64, to: f64) -> Result<Self, ClipError> {
+        let (start, end) = (self.times[0], self.times[self.times.len() - 1]);
+        let (first, last) = (from.max(start), to.min(end));
+        // False for NaN too.
+        if !(first < last) {
+            return Err(ClipError::Cut {
+                from,
+                to,
+                start,
+                end,
+            });
+        }
+        let inner = self.times.iter().copied();
+        let inner = inner.filter(|time| first < *time && *time < last);
+        let times = std::iter::once(first).chain(inner).chain([last]);
+        Ok(self.sampled_at(times.collect()))
     }
 
     /// The clip's values at other times (rising).

@@ -10,7 +10,8 @@ use crate::facs::ActionUnitTable;
 pub const WEIGHT_TOLERANCE: f64 = 0.05;
 
 /// What wrote a take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum TakeFormat {
     /// Keyed text that starts with `fabrig-keys`.
     Keys,

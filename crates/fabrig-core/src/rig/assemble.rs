@@ -3,7 +3,7 @@
 use crate::Point;
 use crate::anatomy::{self, Resolution};
 use crate::mesh::{Mesh, SurfacePoint};
-use crate::registration::{Registration, RigidComponent};
+use crate::registration::{Registration, RegistrationReport, RigidComponent};
 use crate::rig::close_lids::close_lids;
 use crate::rig::parts::name_parts;
 use crate::rig::put_on_face::{FaceSide, ShapesOnFace};
@@ -76,10 +76,14 @@ impl<'a> FaceOnTemplate<'a> {
         face: &'a Mesh,
         registration: &'a Registration,
     ) -> Result<Self, RigError> {
-        let report =
-            serde_json::to_string(&registration.report).map_err(|e| RigError::Content {
-                reason: e.to_string(),
-            })?;
+        let stored = RegistrationReport {
+            // Equal faces give equal rigs, however long it took.
+            times: Vec::new(),
+            ..registration.report.clone()
+        };
+        let report = serde_json::to_string(&stored).map_err(|e| RigError::Content {
+            reason: e.to_string(),
+        })?;
         Ok(Self {
             face,
             to_head: registration.to_head,

@@ -30,8 +30,9 @@ pub struct PackFiles<'a> {
     pub skin_weights: &'a [u8],
 }
 
-static HUMAN: LazyLock<Template> = LazyLock::new(|| {
-    let files = PackFiles {
+/// The files of the bundled pack.
+pub(crate) fn human_files() -> PackFiles<'static> {
+    PackFiles {
         description: include_str!("../../../../templates/human/template.toml"),
         geometry: include_bytes!("../../../../templates/human/geometry.bin"),
         identity: include_bytes!("../../../../templates/human/identity.bin"),
@@ -39,8 +40,11 @@ static HUMAN: LazyLock<Template> = LazyLock::new(|| {
         action_units: include_str!("../../../../templates/human/action_units.toml"),
         materials: include_str!("../../../../templates/human/materials.toml"),
         skin_weights: include_bytes!("../../../../templates/human/skin_weights.bin"),
-    };
-    match Template::from_files(&files) {
+    }
+}
+
+static HUMAN: LazyLock<Template> = LazyLock::new(|| {
+    match Template::from_files(&human_files()) {
         Ok(template) => template,
         // The pack is part of the binary and a test loads it: a build that fails here is not
         // shipped.

@@ -15,6 +15,7 @@ mod store;
 
 pub use demo::{demo_contact_colliders, demo_contact_take, demo_face, demo_take};
 pub use error::TemplateError;
+pub(crate) use load::human_files;
 pub use load::{PackFiles, human};
 pub use pack::{
     EyeSocket, JawHinge, Landmarks, Region, RegionId, Regions, RigidBody, RigidPart, Template,

@@ -1,5 +1,6 @@
 //! `fabrig bench`: measurements that the documentation quotes, one file each.
 
+mod batch;
 mod chain;
 mod demo_scene;
 mod pareto;
@@ -20,6 +21,7 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
     match command {
         BenchCommand::Chain { cloth, json } => chain::run(console, *cloth, *json),
         BenchCommand::Registration(args) => registration::run(console, args),
+        BenchCommand::Batch(args) => batch::run(console, args),
         BenchCommand::Pareto(args) => pareto::run(console, args),
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),

@@ -62,6 +62,19 @@ impl GltfFile {
     }
 }
 
+/// The files beside a glTF file that it has its numbers in; none for what is no glTF.
+pub(crate) fn gltf_buffer_files(path: &Path) -> Vec<PathBuf> {
+    let Ok(bytes) = std::fs::read(path) else {
+        return Vec::new();
+    };
+    let root: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+    let uris = list(&root["buffers"])
+        .iter()
+        .filter_map(|b| b["uri"].as_str());
+    let names = uris.filter(|uri| !uri.contains(':')).filter_map(decoded);
+    names.map(|name| path.with_file_name(name)).collect()
+}
+
 /// The contents of a document's buffers.
 pub(super) fn buffers_of(
     document: &::gltf::Document,
