@@ -4,12 +4,13 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use crate::mesh::io::gltf_buffer_files;
+use super::entry::is_a;
+use crate::mesh::io::gltf_companions;
 use crate::rig::FORMAT_VERSION;
 use crate::template::human_files;
 
@@ -102,26 +103,54 @@ pub(super) fn measure(path: &Path) -> io::Result<(Digest, u64)> {
     Ok((hexadecimal(&hash.finalize()), total))
 }
 
-/// Content of a file that a job reads, or of a folder; a glTF file's buffers go with it.
+/// Content of a file that a job reads, or of a folder; what a mesh speaks of (buffers, materials,
+/// pictures) goes with it.
 ///
 /// # Errors
 ///
 /// What the system says.
 pub(super) fn digest_input(path: &Path) -> io::Result<Digest> {
     let (own, _) = measure(path)?;
-    let is_gltf = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gltf"));
-    if !is_gltf {
+    let companions = if is_a(path, "gltf") || is_a(path, "glb") {
+        gltf_companions(path)
+    } else if is_a(path, "obj") {
+        obj_companions(path)
+    } else {
+        Vec::new()
+    };
+    if companions.is_empty() {
         return Ok(own);
     }
-    let mut key = KeyBuilder::new("gltf").with("file", &own);
-    for buffer in gltf_buffer_files(path) {
-        // A buffer that cannot be read is said by the job that needs it.
-        let digest = measure(&buffer).map_or_else(|_| String::new(), |(digest, _)| digest);
-        key = key.with("buffer", &digest);
+    let mut key = KeyBuilder::new("mesh").with("file", &own);
+    for file in companions {
+        // One that cannot be read is said by the job that needs it.
+        let digest = measure(&file).map_or_else(|_| String::new(), |(digest, _)| digest);
+        key = key.with("beside", &digest);
     }
     Ok(key.finish())
+}
+
+/// The material libraries of an OBJ file, and their pictures.
+fn obj_companions(path: &Path) -> Vec<PathBuf> {
+    let named = |path: &Path, keyword: &str| -> Vec<String> {
+        let bytes = std::fs::read(path).unwrap_or_default();
+        let text = String::from_utf8_lossy(&bytes);
+        let lines = text
+            .lines()
+            .filter_map(|line| line.trim().split_once(char::is_whitespace));
+        let found = lines.filter(|(first, _)| *first == keyword);
+        found.map(|(_, rest)| rest.trim().to_owned()).collect()
+    };
+    let mut files = Vec::new();
+    for library in named(path, "mtllib") {
+        let library = path.with_file_name(library);
+        for line in named(&library, "map_Kd") {
+            let name = line.split_whitespace().next_back().unwrap_or_default();
+            files.push(library.with_file_name(name.replace('\\', "/")));
+        }
+        files.push(library);
+    }
+    files
 }
 
 /// The bundled template.
@@ -162,6 +191,30 @@ mod tests {
         std::fs::rename(&path, folder.path().join("abd")).unwrap();
         let (after, _) = measure(folder.path()).unwrap();
         assert_ne!(before, after);
+    }
+
+    #[test]
+    fn a_mesh_is_its_materials_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let face = put("face.obj", "mtllib face.mtl\nv 0 0 0\n");
+        let mut digests = vec![digest_input(&face).unwrap()];
+        put("face.mtl", "newmtl skin\nmap_Kd -s 1 1 skin.png\n");
+        digests.push(digest_input(&face).unwrap());
+        put("skin.png", "red");
+        digests.push(digest_input(&face).unwrap());
+        put("skin.png", "blue");
+        digests.push(digest_input(&face).unwrap());
+        let same = put("other.png", "green");
+        assert_eq!(digest_input(&face).unwrap(), digests[3]);
+        std::fs::remove_file(same).unwrap();
+        digests.sort();
+        digests.dedup();
+        assert_eq!(digests.len(), 4);
     }
 
     #[test]

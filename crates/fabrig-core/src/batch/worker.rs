@@ -168,7 +168,10 @@ impl AtWork<'_> {
     fn make_rig(&self, path: &Path, progress: OnFraction<'_>) -> Result<Figures, Break> {
         let face = &self.job.task.face;
         let of_face = |error: Error| Failure::of(FailureKind::Face, &face.name, &error);
-        let mut options = RigFaceOptions::default();
+        let mut options = RigFaceOptions {
+            source: Some(face.file.clone()),
+            ..RigFaceOptions::default()
+        };
         options.registration.unit_mm = face.unit.map(Unit::millimetres);
         if let Some(landmarks) = &face.landmarks {
             let order = face.landmarks_order.map(Into::into);

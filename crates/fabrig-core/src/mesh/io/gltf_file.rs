@@ -62,15 +62,16 @@ impl GltfFile {
     }
 }
 
-/// The files beside a glTF file that it has its numbers in; none for what is no glTF.
-pub(crate) fn gltf_buffer_files(path: &Path) -> Vec<PathBuf> {
+/// The files beside a glTF file that it speaks of: numbers and pictures; none for what is no
+/// glTF.
+pub(crate) fn gltf_companions(path: &Path) -> Vec<PathBuf> {
     let Ok(bytes) = std::fs::read(path) else {
         return Vec::new();
     };
-    let root: Value = serde_json::from_slice(&bytes).unwrap_or_default();
-    let uris = list(&root["buffers"])
-        .iter()
-        .filter_map(|b| b["uri"].as_str());
+    let root = document_of(&bytes).map_or(Value::Null, |(root, _)| root);
+    let entries = ["buffers", "images"];
+    let entries = entries.iter().flat_map(|kind| list(&root[*kind]));
+    let uris = entries.filter_map(|entry| entry["uri"].as_str());
     let names = uris.filter(|uri| !uri.contains(':')).filter_map(decoded);
     names.map(|name| path.with_file_name(name)).collect()
 }

@@ -15,7 +15,7 @@ mod shapes;
 mod stl;
 mod write;
 
-pub(crate) use gltf_file::{GltfFile, gltf_buffer_files};
+pub(crate) use gltf_file::{GltfFile, gltf_companions};
 pub(crate) use obj::logical_lines;
 
 pub use error::{MeshIoError, ObjProblem};
