@@ -6,11 +6,10 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use fabrig_core::batch::BatchReport;
 use fabrig_core::edit::load_edited_rig;
-use fabrig_core::render::{Image, Picture};
+use fabrig_core::render::{FaceLook, Image, Picture, simulation_layers};
 use fabrig_core::scene::{FacePose, Scene, Simulation};
 
 use super::html::{Figures, escape, page_of, table, write_page};
-use super::subjects::face_layers;
 use crate::console::Console;
 
 /// Pixels of a face's picture.
@@ -169,6 +168,6 @@ fn picture(rig: &Path) -> Result<Image> {
     simulation.reset(pose)?;
     let picture = Picture::new(SIZE, SIZE)
         .with_focus(focus)
-        .with_layers(face_layers(&simulation)?);
+        .with_layers(simulation_layers(&simulation, &FaceLook::default())?);
     Ok(picture.render()?)
 }
