@@ -102,7 +102,7 @@ impl Place<'_> {
     }
 
     /// A path of the manifest, from where the program is.
-    fn from_here(&self, path: &Path) -> PathBuf {
+    fn below_manifest(&self, path: &Path) -> PathBuf {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         folder.join(path)
     }
@@ -122,7 +122,7 @@ impl Place<'_> {
                 let problem = "`name` is one name, and `file` may be many: leave one of them out";
                 return Err(self.entry(what, problem));
             }
-            let whole = self.from_here(entry.file());
+            let whole = self.below_manifest(entry.file());
             let files = expand(&whole).map_err(|e| self.entry(what.clone(), e.to_string()))?;
             if files.is_empty() {
                 return Err(self.entry(what, "no file is called like that"));
@@ -167,7 +167,7 @@ impl Place<'_> {
                 &mut face.template,
             ];
             for path in paths.iter_mut().filter_map(|path| path.as_mut()) {
-                *path = self.from_here(Path::new(&fill(&path.to_string_lossy(), names)));
+                *path = self.below_manifest(Path::new(&fill(&path.to_string_lossy(), names)));
             }
             let is_for_meshes = face.landmarks.is_some()
                 || face.shapes.is_some()

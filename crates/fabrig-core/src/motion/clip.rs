@@ -348,7 +348,8 @@ impl Clip {
         let (start, end) = (self.times[0], self.times[self.times.len() - 1]);
         let (first, last) = (from.max(start), to.min(end));
         // False for NaN too.
-        if !(first < last) {
+        let is_something = first < last;
+        if !is_something {
             return Err(ClipError::Cut {
                 from,
                 to,
