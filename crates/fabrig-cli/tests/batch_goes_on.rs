@@ -258,7 +258,7 @@ fn in_own_mounts(script: &str, arguments: &[&Path]) -> Option<Output> {
         .arg("mount -t tmpfs none /mnt")
         .output();
     if !probe.is_ok_and(|probe| probe.status.success()) {
-        eprintln!("this system lets nobody mount: full disks are not tried, full files are");
+        // Then full disks are not tried; full files are, below.
         return None;
     }
     Some(command.args(arguments).output().expect("run"))
