@@ -87,6 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             parts: &[&eye],
             contact: None,
             strains: &[],
+            magnets: &[],
             head: Isometry3::rotation(Vector3::y() * 0.3 * f64::from((t * TAU * 0.4).sin())),
             weights: &[
                 0.5 - 0.5 * (t * TAU).cos(),

@@ -86,6 +86,7 @@ fn record(recorder: &mut McapRecorder, frames: u64) {
                 parts: &[&eye],
                 contact: None,
                 strains: &[],
+                magnets: &[],
                 head: head(k),
                 weights: &[0.0, 0.01 * k as f32],
                 stats: &[4.5],
@@ -176,6 +177,7 @@ fn strain_is_recorded_where_it_is_asked_for() {
         parts: &[&sheet],
         contact: None,
         strains: &[],
+        magnets: &[],
         head: Isometry3::identity(),
         weights: &[0.0, 0.0],
         stats: &[0.0],
@@ -188,6 +190,7 @@ fn strain_is_recorded_where_it_is_asked_for() {
     let frame = Frame {
         contact: None,
         strains: &strains,
+        magnets: &[],
         ..frame
     };
     for _ in 0..60 {
@@ -331,6 +334,7 @@ fn frames_that_do_not_fit_are_refused() {
         parts: &[&good],
         contact: None,
         strains: &[],
+        magnets: &[],
         head: Isometry3::identity(),
         weights: &[0.0, 0.0],
         stats: &[0.0],

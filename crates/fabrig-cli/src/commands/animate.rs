@@ -197,9 +197,26 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
     if let Some(contact) = &report.contact {
         print_contact(&line, contact);
     }
+    for topic in &report.recording.topics {
+        line(
+            "topic",
+            format!(
+                "{:<17} {:>6} messages, {:>7.1} MB before compression",
+                topic.topic,
+                topic.messages,
+                topic.raw_bytes as f64 / 1e6
+            ),
+        );
+    }
     line(
         "file",
-        format!("{:.1} MB", report.recording.bytes as f64 / 1e6),
+        format!(
+            "{:.1} MB, {:.2} a second; rounded: positions at most {:.1} um off, normals {:.4}",
+            report.recording.bytes as f64 / 1e6,
+            report.recording.bytes as f64 / 1e6 / report.recording.duration_secs.max(1e-9),
+            report.recording.position_error_um,
+            report.recording.normal_error
+        ),
     );
     line("time", format!("{:.2} s", report.wall_secs));
 }

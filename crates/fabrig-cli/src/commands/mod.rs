@@ -8,15 +8,19 @@ mod check;
 mod contact_pictures;
 mod convert;
 mod demo;
+mod doctor;
 mod edit;
 mod export;
 mod html;
 mod info;
+#[cfg(feature = "play")]
+mod play;
 mod pose;
 mod render;
 mod report;
 mod retarget;
 mod rig;
+mod self_description;
 mod subjects;
 mod template;
 mod viewers;
@@ -50,11 +54,20 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
         Command::Convert(args) => convert::run(console, &args),
         Command::Batch(args) => batch::run(console, &args),
         Command::Retarget(args) => retarget::run(console, &args),
+        #[cfg(feature = "play")]
+        Command::Play(args) => play::run(console, &args),
+        #[cfg(not(feature = "play"))]
+        Command::Play(_) => bail!(
+            "this build has no `play`: cargo install --path crates/fabrig-cli --features play"
+        ),
         Command::Edit(command) => edit::run(console, &command),
         Command::Render(args) => render::run(console, &args),
         Command::Info(args) => info::run(console, &args),
         Command::Template(command) => template::run(console, &command),
         Command::Bench(command) => bench::run(console, &command),
+        Command::Doctor(args) => doctor::run(console, &args),
+        Command::Completions(args) => self_description::completions(&args),
+        Command::Man => self_description::man(),
     }
 }
 

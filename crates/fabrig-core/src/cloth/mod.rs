@@ -83,6 +83,7 @@ mod validate;
 mod tests;
 
 pub use error::ClothError;
+pub use group::instruction_set;
 pub use hook::{HookSubstep, SubstepHook};
 pub use input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,

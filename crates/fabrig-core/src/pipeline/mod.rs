@@ -22,16 +22,20 @@
 mod animate;
 mod contact;
 mod cost;
+mod frames;
+mod live;
 mod own_shapes;
 mod own_template;
 mod rig_face;
 mod runtime;
 mod strain;
+mod surfaces;
 mod timing;
 
 pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
+pub use live::LiveFace;
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};

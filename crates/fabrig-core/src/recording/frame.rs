@@ -33,6 +33,8 @@ pub mod topics {
     pub const SKIN_POINTS: &str = "/points/skin";
     /// Patch nodes as points.
     pub const PATCH_POINTS: &str = "/points/patches";
+    /// Where the muscle shapes want the patch nodes, as points; only where it is asked for.
+    pub const MAGNETS: &str = "/points/magnets";
     /// One number per shape or muscle.
     pub const WEIGHTS: &str = "/weights";
     /// One number per energy, error or time.
@@ -98,6 +100,20 @@ pub struct RecordingOptions {
     pub points_hz: f64,
     /// Rate of the patches coloured by [`Frame::strains`], 0 for none. (1/s)
     pub strain_hz: f64,
+    /// Rate of the points that the patches are drawn to ([`Frame::magnets`]), 0 for none. (1/s)
+    pub magnets_hz: f64,
+    /// Whether colliders are written, where there are any.
+    pub colliders: bool,
+    /// Whether arrows are written where things touch.
+    pub contacts: bool,
+    /// Whether the weights of the shapes are written.
+    pub weights: bool,
+    /// Whether the cloth's energies are among the statistics.
+    pub energies: bool,
+    /// Whether the distances from the muscle shapes are among the statistics.
+    pub errors: bool,
+    /// Whether times are among the statistics: then equal inputs no longer give equal bytes.
+    pub timings: bool,
     /// Size at which a chunk is closed; what does not change from frame to frame is stored
     /// once a chunk. (bytes before compression)
     pub chunk_bytes: u64,
@@ -112,6 +128,13 @@ impl Default for RecordingOptions {
             patches_hz: 30.0,
             points_hz: 10.0,
             strain_hz: 0.0,
+            magnets_hz: 0.0,
+            colliders: true,
+            contacts: true,
+            weights: true,
+            energies: true,
+            errors: true,
+            timings: false,
             chunk_bytes: 64 << 20,
             flush_secs: 0.5,
         }
@@ -147,6 +170,9 @@ pub struct Frame<'a> {
     pub patches: &'a [&'a [Point3<f32>]],
     /// Vertices of every part in the head frame. (mm)
     pub parts: &'a [&'a [Point3<f32>]],
+    /// Where the muscle shapes want the nodes of every patch. (mm) Only read where
+    /// [`RecordingOptions::magnets_hz`] asks for it; may be empty otherwise.
+    pub magnets: &'a [&'a [Point3<f32>]],
     /// Stretch of every node of every patch: 0 at rest, 0.1 for a tenth longer. Only read where
     /// [`RecordingOptions::strain_hz`] asks for it; may be empty otherwise.
     pub strains: &'a [&'a [f32]],
@@ -182,6 +208,10 @@ pub struct RecordingReport {
     pub frames: u64,
     /// Simulated time. (s)
     pub duration_secs: f64,
+    /// Largest error of a recorded coordinate: they are rounded. (um)
+    pub position_error_um: f64,
+    /// Largest error of a component of a recorded unit normal.
+    pub normal_error: f64,
     /// Topics that have messages.
     pub topics: Vec<TopicReport>,
 }

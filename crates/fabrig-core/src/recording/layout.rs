@@ -37,31 +37,44 @@ pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> Stri
         Value::from(id)
     };
     let mut scenes = vec![
-        ("skin", "Skin", topics::SKIN),
-        ("patches", "Muscles and fat", topics::PATCHES),
+        ("skin", "Skin", topics::SKIN, options.skin_hz),
+        (
+            "patches",
+            "Muscles and fat",
+            topics::PATCHES,
+            options.patches_hz,
+        ),
+        ("strain", "Strain", topics::STRAIN, options.strain_hz),
+        ("magnets", "Magnets", topics::MAGNETS, options.magnets_hz),
     ];
-    if options.strain_hz > 0.0 {
-        scenes.push(("strain", "Strain", topics::STRAIN));
+    scenes.retain(|(.., hz)| *hz > 0.0);
+    if scenes.is_empty() {
+        scenes.push(("points", "Points", topics::SKIN_POINTS, options.points_hz));
     }
-    let scenes = scenes.into_iter().map(|(id, title, topic)| {
+    let scenes = scenes.into_iter().map(|(id, title, topic, _)| {
         // Arrows stand on the patches, and would be hidden by the skin.
         let mut visible = vec![topic, topics::PARTS, topics::COLLIDERS];
         if topic == topics::PATCHES {
             visible.push(topics::CONTACTS);
+        }
+        if topic == topics::SKIN_POINTS {
+            visible.push(topics::PATCH_POINTS);
         }
         let panel = scene_panel(title, &visible);
         add(format!("3D!{id}"), panel)
     });
     let scenes: Vec<Value> = scenes.collect();
 
-    let weights = plot_panel(
-        "Weights",
-        topics::WEIGHTS,
-        &info.weight_names,
-        &plotted_weights(info),
-        "left",
-    );
-    let weights = add("Plot!weights".to_owned(), weights);
+    let weights = options.weights.then(|| {
+        let panel = plot_panel(
+            "Weights",
+            topics::WEIGHTS,
+            &info.weight_names,
+            &plotted_weights(info),
+            "left",
+        );
+        add("Plot!weights".to_owned(), panel)
+    });
     let units = UNITS.iter().map(|unit| unit.1).chain([COUNTS]);
     let mut below = Vec::new();
     for (index, title) in units.enumerate() {
@@ -80,12 +93,16 @@ pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> Stri
     if !second.is_empty() {
         columns.push(split("row", second));
     }
-    let lower = json!({
-        "direction": "row",
-        "splitPercentage": 42,
-        "first": weights,
-        "second": split("column", columns),
-    });
+    let plots = split("column", columns);
+    let lower = match weights {
+        Some(weights) => json!({
+            "direction": "row",
+            "splitPercentage": 42,
+            "first": weights,
+            "second": plots,
+        }),
+        None => plots,
+    };
     let layout = json!({
         "configById": panels,
         "globalVariables": {},
@@ -139,6 +156,7 @@ fn scene_panel(title: &str, visible: &[&str]) -> Value {
         topics::CONTACTS,
         topics::SKIN_POINTS,
         topics::PATCH_POINTS,
+        topics::MAGNETS,
     ];
     let topics: Map<String, Value> = all
         .iter()

@@ -16,6 +16,7 @@ mod state;
 mod substep;
 mod sweeps;
 
+pub use instructions::instruction_set;
 #[cfg(test)]
 pub(crate) use instructions::tests::with_baseline;
 pub(crate) use instructions::vectorized;

@@ -1,0 +1,216 @@
+//! What is simulated and recorded.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use fabrig_core::recording::{RecordedKind, RecordingOptions};
+
+use super::TakeArgs;
+
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// Frames per second of the simulation [default: the take's]
+    #[arg(long)]
+    pub(crate) fps: Option<f64>,
+    /// Substeps of the cloth per 1/60 s [default: the solver's]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) substeps: Option<u32>,
+    /// Gravity in mm/s^2, world axes, +Y up [default: 0,-9810,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    pub(crate) gravity: Option<[f32; 3]>,
+    /// Wind in mm/s, world axes, added to the take's own
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    pub(crate) wind: Option<[f32; 3]>,
+    /// Leave the cloth out: patches stand where the muscle shapes want them
+    #[arg(long)]
+    pub(crate) without_dynamics: bool,
+    /// What is modelled, as TOML: `docs/scenes.md`; what else is given here goes before it
+    #[arg(long = "scene", value_name = "SCENE.toml")]
+    pub(crate) file: Option<PathBuf>,
+    /// Which patches collide [default: none]
+    #[arg(long, value_enum)]
+    pub(crate) contact: Option<ContactPairs>,
+    /// Things that the face can touch: a TOML file of `colliders` tables
+    #[arg(long, value_name = "COLLIDERS.toml")]
+    pub(crate) colliders: Option<PathBuf>,
+    /// Let lips stick to each other
+    #[arg(long)]
+    pub(crate) sticky_lips: bool,
+}
+
+/// Which patches collide.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ContactPairs {
+    /// None
+    None,
+    /// Ring muscles with themselves: lips, and lids with eyeballs
+    Sphincter,
+    /// All that are not attached to each other
+    All,
+}
+
+/// Something that a recording can hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Recorded {
+    /// Skin, eyeballs, teeth and tongue as shaded meshes
+    Skin,
+    /// Muscles and fat as shaded meshes
+    Patches,
+    /// Skin vertices and patch nodes as points
+    Points,
+    /// Where the muscle shapes want the patch nodes, as points
+    Magnets,
+    /// Patches coloured by their stretch
+    Strain,
+    /// Arrows where things touch
+    Contacts,
+    /// What the face touches
+    Colliders,
+    /// The weights of the shapes
+    Weights,
+    /// The cloth's energies
+    Energies,
+    /// Distances of the patches from their muscle shapes
+    Errors,
+    /// Times of every frame; equal inputs then no longer give equal bytes
+    Timings,
+}
+
+impl From<Recorded> for RecordedKind {
+    fn from(recorded: Recorded) -> Self {
+        match recorded {
+            Recorded::Skin => Self::Skin,
+            Recorded::Patches => Self::Patches,
+            Recorded::Points => Self::Points,
+            Recorded::Magnets => Self::Magnets,
+            Recorded::Strain => Self::Strain,
+            Recorded::Contacts => Self::Contacts,
+            Recorded::Colliders => Self::Colliders,
+            Recorded::Weights => Self::Weights,
+            Recorded::Energies => Self::Energies,
+            Recorded::Errors => Self::Errors,
+            Recorded::Timings => Self::Timings,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RecordingArgs {
+    /// Record only these, with commas between [default: skin, patches, points, contacts,
+    /// colliders, weights, energies, errors]
+    #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
+    pub(crate) record: Vec<Recorded>,
+    /// Skin meshes per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().skin_hz, value_parser = parse_rate)]
+    pub(crate) skin_hz: f64,
+    /// Patch meshes per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().patches_hz, value_parser = parse_rate)]
+    pub(crate) patches_hz: f64,
+    /// Point clouds per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().points_hz, value_parser = parse_rate)]
+    pub(crate) points_hz: f64,
+    /// Patch meshes coloured by their stretch per second in the recording, 0 for none
+    #[arg(long, default_value_t = RecordingOptions::default().strain_hz, value_parser = parse_rate)]
+    pub(crate) strain_hz: f64,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl RecordingArgs {
+    /// What is written how often.
+    pub(crate) fn options(&self) -> RecordingOptions {
+        let options = RecordingOptions {
+            skin_hz: self.skin_hz,
+            patches_hz: self.patches_hz,
+            points_hz: self.points_hz,
+            strain_hz: self.strain_hz,
+            ..RecordingOptions::default()
+        };
+        if self.record.is_empty() {
+            return options;
+        }
+        let kinds: Vec<RecordedKind> = self.record.iter().map(|&what| what.into()).collect();
+        options.only(&kinds)
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct AnimateArgs {
+    /// Rig, as `fabrig rig` makes it
+    pub(crate) rig: PathBuf,
+    /// Live Link Face, ARKit, OpenFace, py-feat or MediaPipe CSV, MediaPipe JSON, Face Cap text
+    /// or keyed text
+    #[arg(long, value_name = "TAKE")]
+    pub(crate) motion: PathBuf,
+    /// Where to write the recording
+    #[arg(short, long, value_name = "OUT.mcap")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) take: TakeArgs,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Where to write the recording
+    #[arg(short, long, value_name = "OUT.mcap", default_value = "demo.mcap")]
+    pub(crate) output: PathBuf,
+    /// Also keep the rig
+    #[arg(long, value_name = "FACE.fabrig")]
+    pub(crate) rig: Option<PathBuf>,
+    /// What is played
+    #[arg(long, value_enum, default_value_t = DemoScene::Performance)]
+    pub(crate) story: DemoScene,
+    /// Also draw the contact story into this folder
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) pictures: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
+}
+
+/// What the demo plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DemoScene {
+    /// A performance of twelve seconds
+    Performance,
+    /// Lips that stick, a finger on the cheek, a ball on the forehead, blinks: contact is on
+    Contact,
+}
+
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate >= 0.0 => Ok(rate),
+        _ => Err("expected a number of times per second, at least 0".to_owned()),
+    }
+}
+
+fn parse_vector(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f32>())
+        .collect::<Result<_, _>>()
+        .map_err(|_| "expected three numbers X,Y,Z".to_owned())?;
+    match numbers[..] {
+        [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok([x, y, z]),
+        _ => Err("expected three finite numbers X,Y,Z".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_are_three_finite_numbers() {
+        assert_eq!(parse_vector("1,-2.5, 3"), Ok([1.0, -2.5, 3.0]));
+        for bad in ["", "1,2", "1,2,3,4", "1,x,3", "1,nan,3"] {
+            assert!(parse_vector(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Measurements.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::BenchBatchArgs;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// What the whole chain loses: the template rigged as a user's face, shape by shape
+    Chain {
+        /// Let the cloth settle on each shape instead of placing the patches
+        #[arg(long)]
+        cloth: bool,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// How well faces of known truth are registered, or with `--cost` how long faces of growing
+    /// size take to rig
+    Registration(BenchRegistrationArgs),
+    /// The cloth solver's time beside its error: modes, substeps, sweeps, stiffness ratios
+    Pareto(BenchParetoArgs),
+    /// Faces times takes with one worker and with two: time, throughput, equal bytes
+    Batch(BenchBatchArgs),
+    /// What a frame costs: faces simple and complex, with and without skin and recording, and
+    /// cloth from 2,000 to 200,000 nodes
+    Runtime(BenchRuntimeArgs),
+    /// The cloth solver's hard cases, each with its worst figure
+    Stability(BenchStabilityArgs),
+    /// How near rigs come to faces' own expressions, beside whole-face delta transfer
+    Table3(BenchTable3Args),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchTable3Args {
+    /// Faces with their own shapes, named as ARKit's, instead of the bundled synthetic ones:
+    /// folders with a neutral mesh (`neutral.obj`), or glTF files with morph targets
+    #[arg(value_name = "FOLDER|FACE.glb")]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Only bundled faces whose name has this in it
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub(crate) filter: String,
+    /// Also write one page with pictures: every pose of every face, coloured by its error
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchParetoArgs {
+    /// The whole take and every setting, instead of its liveliest second and a half and the
+    /// settings about the default
+    #[arg(long)]
+    pub(crate) full: bool,
+    /// Also write one page with plots
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) html: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchRuntimeArgs {
+    /// Frames of each measurement
+    #[arg(long, default_value_t = 120, value_parser = clap::value_parser!(u32).range(10..=100_000))]
+    pub(crate) frames: u32,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchStabilityArgs {
+    /// A million frames at a held target and a thousand random scenes, instead of twenty
+    /// thousand and a hundred
+    #[arg(long)]
+    pub(crate) full: bool,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchRegistrationArgs {
+    /// Only cases whose name has this in it
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) filter: Option<String>,
+    /// Only the first so many of them
+    #[arg(long, value_name = "N")]
+    pub(crate) cases: Option<usize>,
+    /// Time against size instead: from file to rig, stage by stage
+    #[arg(long, conflicts_with_all = ["filter", "cases", "write"])]
+    pub(crate) cost: bool,
+    /// Largest number of vertices with `--cost`
+    #[arg(long, value_name = "N", default_value_t = 1_100_000, requires = "cost")]
+    pub(crate) largest: usize,
+    /// Only write the meshes there, as OBJ, each with the true places of the template's
+    /// vertices beside it
+    #[arg(long, value_name = "FOLDER", conflicts_with = "json")]
+    pub(crate) write: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
