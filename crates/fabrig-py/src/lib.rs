@@ -65,6 +65,7 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(render::write_gif, m)?)?;
     m.add_function(wrap_pyfunction!(render::write_png, m)?)?;
     m.add_function(wrap_pyfunction!(retarget::retarget, m)?)?;
+    m.add_function(wrap_pyfunction!(simulation::demo_scene, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::read_scene, m)?)?;
     m.add_function(wrap_pyfunction!(template::template_pack, m)?)?;
     // What is public is said by the package; the stub has no list of its own.

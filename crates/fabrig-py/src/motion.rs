@@ -391,13 +391,21 @@ pub(crate) fn parse_motion(text: &str, frame_rate: Option<f64>) -> PyResult<PyCl
     Ok(PyClip { inner })
 }
 
-/// The bundled take.
+/// A bundled take.
+///
+/// - `story`: "performance", twelve seconds of a face that shows what it can; or "contact", lips
+///   that press and open, blinks, a face that is pressed, for `fabrig.demo_scene`
 ///
 /// >>> fabrig.demo_take().duration
 /// 12.0
 #[pyfunction]
-pub(crate) fn demo_take() -> PyResult<PyClip> {
-    let text = template::demo_take();
+#[pyo3(signature = (*, story="performance"))]
+pub(crate) fn demo_take(story: &str) -> PyResult<PyClip> {
+    let texts: [(&str, fn() -> &'static str); 2] = [
+        ("performance", template::demo_take),
+        ("contact", template::demo_contact_take),
+    ];
+    let text = one_of("story", story, &texts)?();
     let inner = motion::parse(text, "the bundled take", &ReadOptions::default()).map_err(to_py)?;
     Ok(PyClip { inner })
 }

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use fabrig_core::anatomy::Resolution;
 use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, read_own_shapes, rig_face};
 use fabrig_core::rig::Expression;
 use fabrig_core::template::Template;
-use fabrig_core::transfer::{AlphaMode, OffsetMode};
+use fabrig_core::transfer::{AlphaMode, JawMode, OffsetMode};
 use pyo3::prelude::*;
 
 use crate::arrays;
@@ -41,6 +42,9 @@ use crate::template::template_of;
 ///   "map", or their "own" shapes as they are
 /// - `offsets`: how the template's displacements are put on the face, "global", "frame" or
 ///   "transfer" (deformation transfer)
+/// - `jaw`: how it opens, about its "hinge" or on a "linear" way, as in the paper
+/// - `resolution`: of the patches: "coarse" 2,010 nodes, "standard" 19,380, "fine" 50,080,
+///   "finest" 200,320; all but the standard one fit the skin's weights anew, which takes a while
 /// - `template`: a `Template`, or the folder of one, instead of the bundled one
 /// - `progress`: True for a bar, or a function of (stage, share)
 ///
@@ -50,7 +54,8 @@ use crate::template::template_of;
 #[pyfunction]
 #[pyo3(signature = (
     vertices, faces=None, *, landmarks=None, landmarks_order=None, unit=None, min_confidence=None,
-    cut_seams=None, expressions=None, alpha="own", offsets="global", template=None, progress=None
+    cut_seams=None, expressions=None, alpha="own", offsets="global", jaw="hinge",
+    resolution="standard", template=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
@@ -65,6 +70,8 @@ pub(crate) fn rig(
     expressions: Option<&Bound<'_, PyAny>>,
     alpha: &str,
     offsets: &str,
+    jaw: &str,
+    resolution: &str,
     template: Option<&Bound<'_, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
@@ -105,6 +112,8 @@ pub(crate) fn rig(
     }
     options.rig.alpha = one_of("alpha", alpha, &ALPHA_MODES)?;
     options.rig.offsets = one_of("offsets", offsets, &OFFSET_MODES)?;
+    options.rig.jaw_mode = one_of("jaw", jaw, &JAW_MODES)?;
+    options.rig.resolution = one_of("resolution", resolution, &RESOLUTIONS)?;
     let template = template_of(template)?;
     if let Some(expressions) = expressions {
         (options.expressions, options.expressions_on) =
@@ -160,6 +169,15 @@ const OFFSET_MODES: [(&str, OffsetMode); 3] = [
     ("global", OffsetMode::Global),
     ("frame", OffsetMode::Frame),
     ("transfer", OffsetMode::DeformationTransfer),
+];
+
+const JAW_MODES: [(&str, JawMode); 2] = [("hinge", JawMode::Hinge), ("linear", JawMode::Linear)];
+
+const RESOLUTIONS: [(&str, Resolution); 4] = [
+    ("coarse", Resolution::COARSE),
+    ("standard", Resolution::STANDARD),
+    ("fine", Resolution::FINE),
+    ("finest", Resolution::FINEST),
 ];
 
 /// The value that a name stands for.

@@ -331,7 +331,7 @@ impl PyRig {
     /// >>> rig.check()["passes"]
     /// True
     #[pyo3(signature = (*, gates=None, template=None, contact=false, progress=None))]
-    fn check<'py>(
+    pub(crate) fn check<'py>(
         &self,
         py: Python<'py>,
         gates: Option<BTreeMap<String, f64>>,

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::motion::EyeAngles;
 use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation, hold_pose};
+use fabrig_core::template;
 use nalgebra::{Isometry3, Vector3};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -85,6 +87,21 @@ pub(crate) fn read_scene<'py>(
         Some(path) => scene_file(&path)?,
         None => Scene::default(),
     };
+    arrays::to_python(py, &scene)
+}
+
+/// The scene of the bundled contact story: a finger on the demo face's cheek, a ball on its
+/// forehead, sticky lips; for `fabrig.demo_take(story="contact")`.
+///
+/// >>> [collider["name"] for collider in fabrig.demo_scene()["colliders"]]
+/// ['finger', 'ball']
+#[pyfunction]
+pub(crate) fn demo_scene(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let mut scene = Scene::default();
+    let colliders = read_colliders(template::demo_contact_colliders());
+    scene.colliders = colliders.map_err(|e| to_py(SceneError::from(e)))?;
+    scene.contact.pairs = PairMask::All;
+    scene.contact.sticky_lips = Some(Stickiness::default());
     arrays::to_python(py, &scene)
 }
 

@@ -8,7 +8,7 @@ use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::{
     OwnTemplateOptions, neutral_of_shapes, read_own_shapes, template_from_face,
 };
-use fabrig_core::rig::write_template_weights;
+use fabrig_core::rig::{RigOptions, rig_of_template, write_template_weights};
 use fabrig_core::template::{self, Template};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -20,6 +20,7 @@ use crate::pose::weights_of;
 use crate::progress::{Progress, interruptible};
 use crate::registration::registration_options;
 use crate::render::{Shot, draw_template};
+use crate::rig::PyRig;
 
 /// The bundled template, shared.
 static BUNDLED: LazyLock<Arc<Template>> = LazyLock::new(|| Arc::new(template::human().clone()));
@@ -134,6 +135,38 @@ impl PyTemplate {
         });
         let inner = Arc::new(inner);
         Ok((Self { inner }, arrays::to_python(py, &report)?))
+    }
+
+    /// Whether the template's shapes do on itself what they should: the report of `Rig.check`, as
+    /// `fabrig template check` makes it.
+    ///
+    /// - `gates`: limit by name, instead of the defaults
+    /// - `progress`: True for a bar, or a function of ("check", share)
+    ///
+    /// >>> fabrig.template().check()["passes"]
+    /// True
+    #[pyo3(signature = (*, gates=None, progress=None))]
+    fn check<'py>(
+        slf: &Bound<'py, Self>,
+        gates: Option<BTreeMap<String, f64>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rig = slf.get().rig(slf.py())?;
+        rig.check(slf.py(), gates, Some(slf.as_any()), false, progress)
+    }
+
+    /// The rig of the template itself: its skin, moved by its own muscles.
+    ///
+    /// >>> fabrig.template().rig()
+    /// Rig(4242 vertices, 44 patches, 19380 nodes)
+    fn rig(&self, py: Python<'_>) -> PyResult<PyRig> {
+        let template = Arc::clone(&self.inner);
+        let rig = interruptible(py, move || {
+            rig_of_template(&template, &RigOptions::default())
+        })?;
+        Ok(PyRig {
+            inner: Arc::new(rig.map_err(to_py)?),
+        })
     }
 
     /// Name.

@@ -157,6 +157,8 @@ def stepping(rig: fabrig.Rig, folder: Path) -> None:
 
 def contact(rig: fabrig.Rig, folder: Path) -> None:
     tip = rig.normalized[fabrig.template().landmarks["nose_tip"]]
+    demo = fabrig.demo_scene()
+    assert demo["contact"]["pairs"] == "all" and fabrig.demo_take(story="contact").duration > 1
     ball = {"name": "ball", "shape": {"type": "ball", "radius": 10.0}, "keys": [{"time": 0.0, "position": [0.0, 0.0, 300.0]}]}
     scene = {"contact": {"pairs": "sphincter"}, "colliders": [ball]}
     simulation = fabrig.Simulation(rig, scene=scene)
@@ -238,6 +240,9 @@ def templates(rig: fabrig.Rig, folder: Path) -> None:
     assert template.shape_names == rig.shape_names and "CC0" in template.credit
     assert len(template.regions) == len(template.mesh)
     assert np.abs(template.shape("jawOpen")).max() > 20
+    itself = template.rig()
+    assert len(itself.mesh) == len(template.mesh)
+    assert template.check(gates={"leak_mm": 1.0})["passes"]
     try:
         fabrig.Template.load(folder)
     except fabrig.TemplateError:
