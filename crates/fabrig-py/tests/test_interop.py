@@ -92,6 +92,9 @@ def test_a_missing_extra_says_how_to_install_it(monkeypatch, face):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(ImportError, match=r"pip install 'fabrig\[trimesh\]'"):
         face.to_trimesh()
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(ImportError, match=r"'fabrig\[rerun\]', or pip install rerun-sdk"):
+        fabrig.log_to_rerun("out.mcap")
 
 
 def test_faces_go_to_rerun(rig, tmp_path):

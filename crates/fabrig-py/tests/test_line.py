@@ -15,6 +15,21 @@ def test_a_rig_keeps_the_face_and_survives_the_disk(face, rig, tmp_path):
     assert np.array_equal(again.normalized, rig.normalized)
 
 
+def test_resolution_and_jaw_are_chosen(face, rig):
+    coarse = fabrig.rig(face, resolution="coarse", jaw="linear")
+    assert coarse.node_count == 2_010
+    opened = []
+    for of in (rig, coarse):
+        simulation = fabrig.Simulation(of, dynamics=False)
+        simulation.reset(weights={"jawOpen": 0.5})
+        opened.append(simulation.skin)
+    # Half open, a straight way cuts the arc by about 2 mm.
+    assert 0.5 < np.linalg.norm(opened[0] - opened[1], axis=1).max() < 6
+    for options in ({"resolution": "huge"}, {"jaw": "loose"}):
+        with pytest.raises(fabrig.InputError, match="is not one of"):
+            fabrig.rig(face, **options)
+
+
 def test_rest_stays_and_the_jaw_opens(rig):
     simulation = fabrig.Simulation(rig)
     rest = rig.mesh.vertices

@@ -12,12 +12,14 @@ import numpy as np
 from ._fabrig import InputError, Mesh, Rig, read_mesh
 
 
-def _needed(module: str, extra: str) -> Any:
+def _needed(module: str, package: str | None = None) -> Any:
+    """A module of another package, whose extra has the module's name."""
+    package = package or module
     try:
         return importlib.import_module(module)
     except ImportError as error:
         raise ImportError(
-            f"this needs {module}: pip install 'fabrig[{extra}]', or pip install {module}"
+            f"this needs {package}: pip install 'fabrig[{module}]', or pip install {package}"
         ) from error
 
 
@@ -63,7 +65,7 @@ def _of_meshio(source: Any) -> Mesh:
 
 
 def _of_pyvista(source: Any) -> Mesh:
-    is_surface = isinstance(source, _needed("pyvista", "pyvista").PolyData)
+    is_surface = isinstance(source, _needed("pyvista").PolyData)
     surface = source if is_surface else source.extract_surface()
     flat, faces, at = np.asarray(surface.faces), [], 0
     while at < len(flat):
@@ -74,13 +76,13 @@ def _of_pyvista(source: Any) -> Mesh:
 
 
 def to_trimesh(mesh: Mesh) -> Any:
-    trimesh = _needed("trimesh", "trimesh")
+    trimesh = _needed("trimesh")
     # Merging vertices would change their order.
     return trimesh.Trimesh(vertices=mesh.vertices, faces=mesh.triangles, process=False)
 
 
 def to_meshio(mesh: Mesh) -> Any:
-    meshio = _needed("meshio", "meshio")
+    meshio = _needed("meshio")
     by_size: dict[int, list[list[int]]] = {}
     for face in mesh.faces:
         by_size.setdefault(len(face), []).append(face)
@@ -90,7 +92,7 @@ def to_meshio(mesh: Mesh) -> Any:
 
 
 def to_pyvista(mesh: Mesh) -> Any:
-    pyvista = _needed("pyvista", "pyvista")
+    pyvista = _needed("pyvista")
     counts, corners = mesh.polygons
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
     flat = np.insert(corners.astype(np.int64), starts, counts)

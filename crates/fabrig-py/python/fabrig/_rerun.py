@@ -42,7 +42,7 @@ def log_to_rerun(
     ...     simulation.step(1 / 60)
     ...     fabrig.log_to_rerun(simulation)
     """
-    rr = _needed("rerun", "rerun")
+    rr = _needed("rerun", "rerun-sdk")
     if isinstance(source, Simulation):
         _log_simulation(rr, source, entity, patches, timeline, recording)
         return 1
