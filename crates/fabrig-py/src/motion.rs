@@ -401,11 +401,11 @@ pub(crate) fn parse_motion(text: &str, frame_rate: Option<f64>) -> PyResult<PyCl
 #[pyfunction]
 #[pyo3(signature = (*, story="performance"))]
 pub(crate) fn demo_take(story: &str) -> PyResult<PyClip> {
-    let texts: [(&str, fn() -> &'static str); 2] = [
-        ("performance", template::demo_take),
-        ("contact", template::demo_contact_take),
+    let texts = [
+        ("performance", template::demo_take()),
+        ("contact", template::demo_contact_take()),
     ];
-    let text = one_of("story", story, &texts)?();
+    let text = one_of("story", story, &texts)?;
     let inner = motion::parse(text, "the bundled take", &ReadOptions::default()).map_err(to_py)?;
     Ok(PyClip { inner })
 }
