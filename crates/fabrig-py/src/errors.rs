@@ -34,6 +34,7 @@ exceptions! {
     ClothError(SceneError): "Cloth could not be set up or stepped."
     RecordingError(FabrigError): "A recording could not be written or read."
     ExportError(FabrigError): "A face could not be written for another program."
+    BatchError(FabrigError): "A batch could not be read or planned."
     RenderError(FabrigError): "A picture could not be drawn."
 }
 
@@ -70,6 +71,7 @@ pub(crate) fn to_py(error: impl Into<Error>) -> PyErr {
         Error::Scene(_) => SceneError::new_err(message),
         Error::Export(_) => ExportError::new_err(message),
         Error::Recording(_) => RecordingError::new_err(message),
+        Error::Batch(_) => BatchError::new_err(message),
         Error::Render(_) => RenderError::new_err(message),
         // The core may gain variants.
         _ => FabrigError::new_err(message),

@@ -5,6 +5,7 @@
 //! and to look for Ctrl-C.
 
 mod arrays;
+mod batch;
 mod bench;
 mod cloth;
 mod edits;
@@ -33,6 +34,7 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ARKIT_SHAPES", PyTuple::new(m.py(), ARKIT_SHAPES)?)?;
     errors::register(m)?;
+    m.add_class::<batch::PyBatchPlan>()?;
     m.add_class::<cloth::PyCloth>()?;
     m.add_class::<edits::PyEdits>()?;
     m.add_class::<mesh::PyMesh>()?;
@@ -43,6 +45,7 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::PyRig>()?;
     m.add_class::<simulation::PySimulation>()?;
     m.add_class::<template::PyTemplate>()?;
+    m.add_function(wrap_pyfunction!(batch::batch_job, m)?)?;
     m.add_function(wrap_pyfunction!(bench::bench_chain, m)?)?;
     m.add_function(wrap_pyfunction!(bench::bench_pareto, m)?)?;
     m.add_function(wrap_pyfunction!(bench::bench_registration, m)?)?;

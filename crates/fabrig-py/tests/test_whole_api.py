@@ -88,7 +88,7 @@ def stub_names():
 
 def test_every_name_has_a_stub():
     names = stub_names()
-    inline = {"bench", "log_to_rerun"}  # Python with types of its own
+    inline = {"batch", "bench", "log_to_rerun"}  # Python with types of its own
     for owner, name, _ in NAMES:
         path = f"{owner}.{name}".removeprefix("fabrig.")
         if not path.startswith("bench") and path not in inline:

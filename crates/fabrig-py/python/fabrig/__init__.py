@@ -10,8 +10,10 @@ seconds; +Y is up, +Z out of the face, the character's left is +X. What fabrig r
 """
 
 from . import bench
+from ._batch import batch
 from ._fabrig import (
     ARKIT_SHAPES,
+    BatchError,
     CheckError,
     Clip,
     Cloth,
@@ -62,6 +64,7 @@ from ._rerun import log_to_rerun
 
 __all__ = [
     "ARKIT_SHAPES",
+    "BatchError",
     "CheckError",
     "Clip",
     "Cloth",
@@ -91,6 +94,7 @@ __all__ = [
     "__version__",
     "action_units",
     "animate",
+    "batch",
     "bench",
     "convert",
     "demo_face",
