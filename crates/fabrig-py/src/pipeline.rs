@@ -9,6 +9,7 @@ use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, read_own_shapes, rig_face};
+use fabrig_core::recording::RecordedKind;
 use fabrig_core::rig::Expression;
 use fabrig_core::template::Template;
 use fabrig_core::transfer::{AlphaMode, JawMode, OffsetMode};
@@ -180,6 +181,20 @@ const RESOLUTIONS: [(&str, Resolution); 4] = [
     ("finest", Resolution::FINEST),
 ];
 
+const RECORDED: [(&str, RecordedKind); 11] = [
+    ("skin", RecordedKind::Skin),
+    ("patches", RecordedKind::Patches),
+    ("points", RecordedKind::Points),
+    ("magnets", RecordedKind::Magnets),
+    ("strain", RecordedKind::Strain),
+    ("contacts", RecordedKind::Contacts),
+    ("colliders", RecordedKind::Colliders),
+    ("weights", RecordedKind::Weights),
+    ("energies", RecordedKind::Energies),
+    ("errors", RecordedKind::Errors),
+    ("timings", RecordedKind::Timings),
+];
+
 /// The value that a name stands for.
 pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
     known
@@ -231,6 +246,9 @@ fn expression(
 /// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
 /// - `substeps`: of the cloth, per 1/60 s
 /// - `dynamics`: False leaves patches where the muscle shapes want them
+/// - `record`: all that is to be in the recording, of "skin", "patches", "points", "magnets",
+///   "strain", "contacts", "colliders", "weights", "energies", "errors" and "timings"; by default
+///   everything but magnets, strain and timings
 /// - `skin_hz`, `patches_hz`, `points_hz`, `strain_hz`: meshes a second in the recording, 0 for
 ///   none
 /// - `rig_name`, `take_name`: what the recording calls them
@@ -242,7 +260,7 @@ fn expression(
 /// 4
 #[pyfunction]
 #[pyo3(signature = (rig, clip, output, *, scene=None, fps=None, gravity=None, wind=None, substeps=None,
-                    dynamics=true, skin_hz=None, patches_hz=None, points_hz=None, strain_hz=None,
+                    dynamics=true, record=None, skin_hz=None, patches_hz=None, points_hz=None, strain_hz=None,
                     rig_name=None, take_name=None, layout=None, progress=None))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn animate<'py>(
@@ -256,6 +274,7 @@ pub(crate) fn animate<'py>(
     wind: Option<&Bound<'py, PyAny>>,
     substeps: Option<u32>,
     dynamics: bool,
+    record: Option<Vec<String>>,
     skin_hz: Option<f64>,
     patches_hz: Option<f64>,
     points_hz: Option<f64>,
@@ -290,6 +309,11 @@ pub(crate) fn animate<'py>(
                 "{name}: {value} is not a rate of at least 0"
             )));
         }
+    }
+    if let Some(record) = record {
+        let kinds = record.iter().map(|name| one_of("record", name, &RECORDED));
+        let kinds: Vec<RecordedKind> = kinds.collect::<PyResult<_>>()?;
+        options.recording = options.recording.only(&kinds);
     }
     let mut progress = Progress::new(py, progress)?;
     let (rig, clip) = (Arc::clone(&rig.inner), clip.inner.clone());

@@ -182,12 +182,21 @@ def recording(rig: fabrig.Rig, folder: Path) -> None:
         patches_hz=0,
         points_hz=0,
         strain_hz=0,
+        record=["skin", "weights", "errors"],
         rig_name="sample",
         take_name="a bit",
         layout=folder / "layout.json",
         progress=None,
     )
     assert report["is_complete"] and (folder / "layout.json").stat().st_size > 100
+    topics = {topic["topic"] for topic in report["recording"]["topics"]}
+    assert "/weights" in topics and not any("patches" in topic for topic in topics)
+    try:
+        fabrig.animate(rig, clip, folder / "none.mcap", record=["smell"])
+    except fabrig.InputError as error:
+        assert "record: 'smell' is not one of skin" in str(error)
+    else:
+        raise AssertionError("smells cannot be recorded")
     reader = fabrig.Recording(folder / "out.mcap", recover=True)
     assert reader.metadata["rig"] == "sample"
     frames = list(reader)

@@ -480,6 +480,7 @@ def animate(
     wind: ArrayLike | None = None,
     substeps: int | None = None,
     dynamics: bool = True,
+    record: Sequence[str] | None = None,
     skin_hz: float | None = None,
     patches_hz: float | None = None,
     points_hz: float | None = None,
