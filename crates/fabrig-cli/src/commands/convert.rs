@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use fabrig_core::export::{ConvertOptions, convert};
+use fabrig_core::recording::MessageReader;
 
 use super::animate::load_rig;
 use super::export::{check_target, finish, layout, progress};
@@ -34,7 +35,7 @@ pub(crate) fn run(console: &Console, args: &ConvertArgs) -> Result<Outcome> {
         .is_some_and(|e| e.eq_ignore_ascii_case("rrd"))
     {
         check_output(&output)?;
-        return to_rerun(console, &args.recording, &output);
+        return to_rerun(console, args, &output);
     }
     check_target(&output)?;
     let rig = match &args.rig {
@@ -52,13 +53,27 @@ pub(crate) fn run(console: &Console, args: &ConvertArgs) -> Result<Outcome> {
     finish(console, report, &output, args.json)
 }
 
-/// Rerun's own file, by Rerun's own program.
-fn to_rerun(console: &Console, recording: &Path, output: &Path) -> Result<Outcome> {
+/// Rerun's own file, by Rerun's own program; it takes its name once it is whole.
+fn to_rerun(console: &Console, args: &ConvertArgs, output: &Path) -> Result<Outcome> {
+    let recording = &args.recording;
+    // Rerun's program says little of a file that is none.
+    MessageReader::open(recording, false)?;
+    let folder = match output.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let cannot_write = || format!("cannot write {}", output.display());
+    let made = tempfile::Builder::new()
+        .prefix(".fabrig-")
+        .tempdir_in(folder)
+        .with_context(cannot_write)?;
+    // The name of a recording in Rerun is the stem of its file.
+    let partial = made.path().join(output.file_name().unwrap_or_default());
     let tried = std::process::Command::new("rerun")
         .args(["mcap", "convert"])
         .arg(recording)
         .arg("-o")
-        .arg(output)
+        .arg(&partial)
         .stdin(std::process::Stdio::null())
         .output();
     let done = match tried {
@@ -69,7 +84,20 @@ fn to_rerun(console: &Console, recording: &Path, output: &Path) -> Result<Outcom
         let said = String::from_utf8_lossy(&done.stderr);
         bail!("`rerun mcap convert` failed: {}", said.trim());
     }
-    console.result(&format!("{:<20}{}", "written", output.display()));
+    let bytes = std::fs::metadata(&partial).map(|file| file.len());
+    let bytes = bytes.context("`rerun mcap convert` wrote nothing")?;
+    std::fs::rename(&partial, output).with_context(cannot_write)?;
+    if args.json {
+        let report = serde_json::json!({"format": "rrd", "files": 1, "bytes": bytes});
+        console.result(&serde_json::to_string_pretty(&report)?);
+        return Ok(Outcome::Done);
+    }
+    console.result(&format!(
+        "{:<20}{}, {:.2} MB",
+        "written",
+        output.display(),
+        bytes as f64 / 1e6
+    ));
     Ok(Outcome::Done)
 }
 
