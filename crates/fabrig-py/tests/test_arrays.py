@@ -54,7 +54,7 @@ def test_clips_are_checked():
 
 def test_every_error_is_a_fabrig_error():
     errors = [getattr(fabrig, name) for name in fabrig.__all__ if name.endswith("Error")]
-    assert len(errors) == 16
+    assert len(errors) == 17
     assert all(issubclass(error, fabrig.FabrigError) for error in errors)
 
 
