@@ -165,7 +165,7 @@ pub fn register(
         &shaped,
         &mut |vertices, is_first_of_stage| {
             if is_first_of_stage {
-                seams = seam_pins(&model, &target, vertices)?;
+                seams = Seams::find(&model, &target, vertices)?.pins(&model);
             }
             Ok([pins.landmarks(4.0), seams.clone()].concat())
         },
@@ -174,12 +174,12 @@ pub fn register(
     clock.finish("deform");
 
     clock.step("refine", 0.65)?;
-    let partings = find_partings(&model.openings, &target.surface, &coarse);
+    let found = Seams::find(&model, &target, &coarse)?;
     let mut refined = refine(
         &model,
         &target,
         &coarse,
-        &[pins.landmarks(40.0), seam_pins(&model, &target, &coarse)?].concat(),
+        &[pins.landmarks(40.0), found.pins(&model)].concat(),
         |share| clock.step("refine", 0.65 + 0.25 * share),
     )?;
     unfold(&model, &mut refined)?;
@@ -191,7 +191,7 @@ pub fn register(
     clock.step("map", 0.9)?;
     let topology = Topology::from_triangles(target.positions.len(), &target.triangles);
     let measured = OpeningKind::ALL.map(|kind| {
-        let parting = partings.iter().find(|p| p.kind == kind);
+        let parting = found.face.iter().find(|p| p.kind == kind);
         measure_opening(&target, &topology, parting)
     });
     let has_open_eyes = measured[1..].iter().all(|m| m.state == OpeningState::Open);
@@ -233,15 +233,10 @@ pub fn register(
     let target = target_of(&cleaned, start.piece, &to_head)?;
     let measures = measure(&model, &target, &positions)?;
     let mut openings = measured.map(|m| m.scaled(to_true_size.scaling()));
-    let own = find_partings(
-        &model.openings,
-        &Surface::new(&positions, &model.triangles)?,
-        &positions,
-    );
-    let found = find_partings(&model.openings, &target.surface, &positions);
+    let found = Seams::find(&model, &target, &positions)?;
     for (opening, kind) in openings.iter_mut().zip(OpeningKind::ALL) {
         let of = |partings: &[Parting]| partings.iter().find(|p| p.kind == kind).cloned();
-        opening.seam = seam_distances(of(&own).as_ref(), of(&found).as_ref());
+        opening.seam = seam_distances(of(&found.own).as_ref(), of(&found.face).as_ref());
     }
     let [mouth, left_eye, right_eye] = openings;
     let openings = OpeningMeasures {
@@ -513,20 +508,30 @@ impl Pins {
     }
 }
 
-/// Pins of lips and lids: where one sees them part on the deformed template to where one sees
-/// them part on the face.
-fn seam_pins(
-    model: &FaceModel<'_>,
-    target: &Target,
-    vertices: &[Point],
-) -> Result<Vec<Pin>, RegistrationError> {
-    let own = Surface::new(vertices, &model.triangles)?;
-    Ok(parting_pins(
-        model,
-        &find_partings(&model.openings, &own, vertices),
-        &find_partings(&model.openings, &target.surface, vertices),
-        SEAM_WEIGHT,
-    ))
+/// Where one sees lips and lids part.
+struct Seams {
+    /// On the template as far as it has been deformed.
+    own: Vec<Parting>,
+    /// On the face.
+    face: Vec<Parting>,
+}
+
+impl Seams {
+    fn find(
+        model: &FaceModel<'_>,
+        target: &Target,
+        vertices: &[Point],
+    ) -> Result<Self, RegistrationError> {
+        let own = Surface::new(vertices, &model.triangles)?;
+        Ok(Self {
+            own: find_partings(&model.openings, &own, vertices),
+            face: find_partings(&model.openings, &target.surface, vertices),
+        })
+    }
+
+    fn pins(&self, model: &FaceModel<'_>) -> Vec<Pin> {
+        parting_pins(model, &self.own, &self.face, SEAM_WEIGHT)
+    }
 }
 
 /// From the frame of the first alignment to the head frame proper, turned and placed for the

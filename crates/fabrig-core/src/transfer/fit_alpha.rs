@@ -236,30 +236,7 @@ fn limited(alpha: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::transfer::fit_open_angle;
-
-    fn hinge() -> JawHinge {
-        JawHinge {
-            center: Point::new(0.0, 0.0, -20.0),
-            axis: Vector::x(),
-            open_angle: 0.4,
-            forward: Vector::z(),
-            left: Vector::x(),
-        }
-    }
-
-    fn shape(index: u32, deltas: &[[f32; 3]]) -> MuscleShape {
-        MuscleShape {
-            name: format!("p.{index}"),
-            shape: index,
-            deltas: deltas.iter().map(|d| (*d).into()).collect(),
-        }
-    }
-
-    fn nodes(count: usize) -> Vec<Point> {
-        (0..count)
-            .map(|i| Point::new(i as f64, -40.0 - (i % 7) as f64, 60.0))
-            .collect()
-    }
+    use crate::transfer::fixtures::{hinge, nodes, shape};
 
     #[test]
     fn amplitudes_are_found_again_shape_by_shape_and_without_examples_stay() {

@@ -192,32 +192,8 @@ fn golden_section(f: impl Fn(f64) -> f64, range: [f64; 2], tolerance: f64) -> f6
 mod tests {
     use super::*;
     use crate::Point;
-    use crate::transfer::MuscleShape;
+    use crate::transfer::fixtures::{hinge, nodes, shape};
     use crate::transfer::jaw::turn;
-
-    fn hinge() -> JawHinge {
-        JawHinge {
-            center: Point::new(0.0, 0.0, -20.0),
-            axis: Vector::x(),
-            open_angle: 0.4,
-            forward: Vector::z(),
-            left: Vector::x(),
-        }
-    }
-
-    fn shape(index: u32, deltas: &[[f32; 3]]) -> MuscleShape {
-        MuscleShape {
-            name: format!("p.{index}"),
-            shape: index,
-            deltas: deltas.iter().map(|d| (*d).into()).collect(),
-        }
-    }
-
-    fn nodes(count: usize) -> Vec<Point> {
-        (0..count)
-            .map(|i| Point::new(i as f64, -40.0 - (i % 7) as f64, 60.0))
-            .collect()
-    }
 
     /// A face whose jaw follows the hinge, and one that goes straight though its chin is longer
     /// than the template's: both are met, where the hinge alone would miss the second.

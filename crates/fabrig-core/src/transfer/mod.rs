@@ -23,6 +23,8 @@ mod examples;
 mod fit_alpha;
 mod fit_jaw;
 mod fit_maps;
+#[cfg(test)]
+mod fixtures;
 mod jaw;
 mod lids;
 mod offset;
