@@ -22,6 +22,8 @@ RUSTDOCFLAGS="-D warnings" cargo doc "${rust[@]}" --no-deps
 
 step tests
 cargo test "${rust[@]}"
+# Tests build the examples too; this one writes what independent readers are given to read.
+"$target/release/examples/record_synthetic" "$target/synthetic.mcap" 2 24
 
 step python
 python3 -m venv "$target/venv"
@@ -32,7 +34,8 @@ rm -rf "$target/wheels"
 "$python" -m pip install -q --disable-pip-version-check --force-reinstall --no-deps "$target"/wheels/*.whl
 # Khronos' glTF validator is a package of Node's, which requirements.txt brings.
 "$target/venv/bin/npm" install --silent --no-fund --prefix "$target/gltf-validator" gltf-validator@2.0.0-dev.3.10
-export FABRIG_GLTF_VALIDATOR FABRIG_WHEEL
+export FABRIG_GLTF_VALIDATOR FABRIG_RECORDING FABRIG_WHEEL
+FABRIG_RECORDING=$(realpath "$target/synthetic.mcap")
 FABRIG_WHEEL=$(realpath "$target"/wheels/*.whl)
 FABRIG_GLTF_VALIDATOR=$(realpath "$target/gltf-validator")
 "$python" -W error -m pdoc -o "$target/python-docs" fabrig
