@@ -25,6 +25,7 @@ fn sheet(height: f32, material: Material) -> ClothPatch {
         rest,
         material,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }
 

@@ -96,6 +96,7 @@ impl PyCloth {
                 rest: grid.points,
                 material,
                 attachments: Vec::new(),
+                variations: Vec::new(),
             });
         }
         let count = patches.len();

@@ -1,5 +1,6 @@
 //! What can be wrong with what a cloth is given.
 
+use super::input::NodeVariation;
 use super::materials::MaterialError;
 
 /// Why a cloth cannot be made or stepped. Nothing has changed when a step returns one.
@@ -45,6 +46,18 @@ pub enum ClothError {
         /// What is wrong.
         #[source]
         source: MaterialError,
+    },
+    /// Not one variation per node, or a factor out of its range.
+    #[error("patch {patch}: the variation of node {node} is {value:?}; {condition}")]
+    Variation {
+        /// Index of the patch.
+        patch: usize,
+        /// Index of the node.
+        node: usize,
+        /// Its factors, if there are any for it.
+        value: Option<NodeVariation>,
+        /// What is expected.
+        condition: &'static str,
     },
     /// An attachment names a patch or a node that does not exist.
     #[error("patch {patch}: attachment {attachment} names {what} {index}, but there are {count}")]

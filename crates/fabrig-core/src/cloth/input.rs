@@ -21,6 +21,31 @@ pub struct ClothPatch {
     pub material: Material,
     /// What it is attached to.
     pub attachments: Vec<ClothAttachment>,
+    /// How its nodes differ from the material, one per node; or none, where none does.
+    pub variations: Vec<NodeVariation>,
+}
+
+/// How the cloth about one node differs from its material: a wrinkle map's word. An edge, a
+/// diagonal and a bend take the mean of their nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeVariation {
+    /// Factor of the resistances to stretch, compression and shear, 0.001 to 1,000.
+    pub stretch: f32,
+    /// Factor of the resistance to bending, 0.001 to 1,000.
+    pub bend: f32,
+    /// Factor of [`ClothOptions::rest_blend`], 0 to 1: with 0 lengths stay neutral, and skin
+    /// that is drawn together has to fold.
+    pub rest_blend: f32,
+}
+
+impl NodeVariation {
+    /// As the material says.
+    pub const NONE: Self = Self {
+        stretch: 1.0,
+        bend: 1.0,
+        rest_blend: 1.0,
+    };
 }
 
 /// Nodes held to something (Eq. 5).

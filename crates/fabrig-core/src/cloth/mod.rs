@@ -11,7 +11,7 @@
 //! let rest: Vec<Point3<f32>> = (0..80)
 //!     .map(|i| Point3::new((i % 10) as f32 * 2.0, (i / 10) as f32 * 2.0, 0.0))
 //!     .collect();
-//! let patch = ClothPatch { shape, rest: rest.clone(), material: Material::FAT, attachments: vec![] };
+//! let patch = ClothPatch { shape, rest: rest.clone(), material: Material::FAT, attachments: vec![], variations: vec![] };
 //! let mut cloth = Cloth::new(&[patch], &ClothOptions::default())?;
 //!
 //! // The target jumps up by 5 mm in one frame and stays there; the cloth follows and rings.
@@ -87,7 +87,7 @@ pub use group::instruction_set;
 pub use hook::{HookSubstep, SubstepHook};
 pub use input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,
-    PatchMotion, Precision, STANDING_GRAVITY,
+    NodeVariation, PatchMotion, Precision, STANDING_GRAVITY,
 };
 pub use materials::{Material, MaterialError, Materials, TIME_UNIT};
 pub use report::{Counters, Energies, StepReport};

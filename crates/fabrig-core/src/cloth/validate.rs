@@ -79,8 +79,39 @@ pub(crate) fn patches(patches: &[ClothPatch]) -> Result<(), ClothError> {
                 patch: index,
                 source,
             })?;
+        variations(index, patch)?;
         for attachment in 0..patch.attachments.len() {
             self::attachment(patches, index, attachment)?;
+        }
+    }
+    Ok(())
+}
+
+fn variations(index: usize, patch: &ClothPatch) -> Result<(), ClothError> {
+    let (given, expected) = (&patch.variations, patch.rest.len());
+    let wrong = |node: usize, condition| ClothError::Variation {
+        patch: index,
+        node,
+        value: given.get(node).copied(),
+        condition,
+    };
+    if !given.is_empty() && given.len() != expected {
+        let node = given.len().min(expected);
+        return Err(wrong(
+            node,
+            "there must be one for each node, or none at all",
+        ));
+    }
+    let factor = 0.001..=1000.0;
+    for (node, v) in given.iter().enumerate() {
+        if !(factor.contains(&v.stretch) && factor.contains(&v.bend)) {
+            return Err(wrong(
+                node,
+                "stretch and bend must be between 0.001 and 1000",
+            ));
+        }
+        if !(0.0..=1.0).contains(&v.rest_blend) {
+            return Err(wrong(node, "rest_blend must be between 0 and 1"));
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{EditError, Edits, MaterialEdit, PatchEdit, ShapeEdit};
+use super::{EditError, Edits, MaterialEdit, PatchEdit, ShapeEdit, WrinkleMap, apply_wrinkle_map};
 use crate::Error;
 use crate::cloth::Materials;
 use crate::facs::nearest_name;
@@ -26,6 +26,10 @@ impl Edits {
         }
         for (name, edit) in &self.shapes {
             edit_shape(&mut edited, name, edit)?;
+        }
+        for (name, edit) in &self.wrinkles {
+            let map = WrinkleMap::read(&self.folder.join(&edit.map))?;
+            apply_wrinkle_map(&mut edited, name, &map, edit)?;
         }
         *rig = edited;
         Ok(())

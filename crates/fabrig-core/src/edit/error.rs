@@ -63,6 +63,14 @@ pub enum EditError {
         /// Vertices of the mesh.
         found: usize,
     },
+    /// A wrinkle map cannot be used.
+    #[error("wrinkle map {}: {problem}", path.display())]
+    WrinkleMap {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        problem: String,
+    },
     /// Materials do not come out valid.
     #[error("the edited materials are not valid")]
     Materials(#[from] crate::cloth::MaterialError),

@@ -21,6 +21,12 @@ pub struct Edits {
     /// By material.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub materials: BTreeMap<String, MaterialEdit>,
+    /// Wrinkle maps, by names of the artist's own.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub wrinkles: BTreeMap<String, WrinkleEdit>,
+    /// Where the files are that edits name: the folder of their own file.
+    #[serde(skip)]
+    pub folder: PathBuf,
 }
 
 /// What changes about one muscle shape.
@@ -49,6 +55,32 @@ pub struct PatchEdit {
     /// Name of its material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
+}
+
+/// Where a wrinkle map is, and what it says where it is white.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WrinkleEdit {
+    /// A PNG in the mesh's texture coordinates, or a text of one number in [0, 1] per vertex;
+    /// beside the edits unless the path is absolute.
+    pub map: PathBuf,
+    /// Patches that it is for; none named means all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub patches: Vec<String>,
+    /// Factor of the resistances to stretch, compression and shear.
+    #[serde(default = "one")]
+    pub stretch: f64,
+    /// Factor of the resistance to bending: less makes finer wrinkles.
+    #[serde(default = "one")]
+    pub bend: f64,
+    /// Factor of how far lengths follow the muscle shapes: 0 lets skin that is drawn together
+    /// fold.
+    #[serde(default)]
+    pub rest_blend: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// A new material, or changes to one that there is.
@@ -90,7 +122,11 @@ impl Edits {
             path: path.to_owned(),
             source,
         })?;
-        Self::parse(&text)
+        let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        Ok(Self {
+            folder,
+            ..Self::parse(&text)?
+        })
     }
 
     /// The edits beside a rig file; `None` where there are none.
@@ -136,7 +172,11 @@ impl Edits {
 
     /// Whether nothing is edited.
     pub fn is_empty(&self) -> bool {
-        *self == Self::default()
+        let nothing = Self {
+            folder: self.folder.clone(),
+            ..Self::default()
+        };
+        *self == nothing
     }
 }
 

@@ -20,6 +20,13 @@
 //! [materials.soft_fat]  # a new material, or changes to one that there is
 //! like = "fat"
 //! bend_resistance = 1.0
+//!
+//! [wrinkles.forehead]   # skin that folds where the map is white
+//! map = "forehead.png"  # in texture coordinates, or a text of one number per vertex
+//! patches = ["frontalis_l", "frontalis_r", "forehead_fat"]
+//! stretch = 2.0         # factors where the map is 1
+//! bend = 0.5
+//! rest_blend = 0.0      # lengths stay neutral
 //! ```
 //!
 //! # Source
@@ -30,8 +37,10 @@ mod apply;
 mod error;
 mod file;
 mod muscle_mesh;
+mod wrinkle_map;
 
 pub use apply::load_edited_rig;
 pub use error::EditError;
-pub use file::{Edits, MaterialEdit, PatchEdit, ShapeEdit, edits_path};
+pub use file::{Edits, MaterialEdit, PatchEdit, ShapeEdit, WrinkleEdit, edits_path};
 pub use muscle_mesh::{export_muscle_shape, import_muscle_shape, muscle_shape_names};
+pub use wrinkle_map::{WrinkleMap, apply_wrinkle_map};

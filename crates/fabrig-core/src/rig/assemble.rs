@@ -201,6 +201,7 @@ pub fn build(
         materials: template.materials.clone(),
         registration_report: report.clone(),
         appearance: None,
+        variations: Vec::new(),
     };
     close_lids(&mut rig, template);
     Ok(rig)

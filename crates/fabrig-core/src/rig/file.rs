@@ -8,8 +8,8 @@
 //! 24  .  zstd of the rig in postcard encoding
 //! ```
 //!
-//! Equal rigs give equal bytes. Version 4 added the materials and pictures of the face, at the
-//! end; version 3 is read as a face without.
+//! Equal rigs give equal bytes. Version 4 added the materials and pictures of the face and how
+//! nodes differ from their material, at the end; version 3 is read as a face without.
 
 use std::path::Path;
 
@@ -18,15 +18,15 @@ use crate::rig::{Rig, RigError};
 
 /// Version of the format that this build writes.
 pub const FORMAT_VERSION: u32 = 4;
-/// Oldest version that this build reads: it ends before the appearance, and reads as a face
-/// without one.
+/// Oldest version that this build reads: it ends before appearance and variations, and reads as a
+/// face without them.
 pub const OLDEST_VERSION: u32 = 3;
 
 const MARK: &[u8; 8] = b"FABRIG\r\n";
 const HEADER_LENGTH: usize = 24;
 const COMPRESSION_LEVEL: i32 = 9;
-/// Postcard's `None`.
-const NO_APPEARANCE: u8 = 0;
+/// Postcard's `None` for the appearance, and its empty list of variations.
+const NEITHER: [u8; 2] = [0, 0];
 /// No honest rig decompresses to more. (bytes)
 const LARGEST_CONTENT: usize = 4 << 30;
 
@@ -92,7 +92,7 @@ impl Rig {
             .ok_or_else(|| content("the compressed part does not say how large it is"))?;
         let mut plain = zstd::bulk::decompress(packed, capacity).map_err(content)?;
         if version < FORMAT_VERSION {
-            plain.push(NO_APPEARANCE);
+            plain.extend(NEITHER);
         }
         let rig: Self = postcard::from_bytes(&plain).map_err(content)?;
         if let Some(appearance) = &rig.appearance {

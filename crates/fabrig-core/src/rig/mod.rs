@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Point;
 use crate::anatomy::{GridShape, Patch};
+use crate::cloth::NodeVariation;
 use crate::mesh::Mesh;
 use crate::mesh::appearance::Appearance;
 use crate::skin::{NodeAffine, SkinBinding};
@@ -101,8 +102,11 @@ pub struct Rig {
     pub registration_report: String,
     /// Materials and pictures of the face; none where the mesh came without.
     ///
-    /// Last, so that files of the version before read as faces without.
+    /// This and what follows is last, so that files of the version before read as faces without.
     pub appearance: Option<Appearance>,
+    /// For each patch how its nodes differ from its material, one per node, or nothing where none
+    /// does; empty where no patch has any.
+    pub variations: Vec<Vec<NodeVariation>>,
 }
 
 impl Rig {

@@ -565,13 +565,15 @@ pub fn cloth_patches(rig: &Rig) -> Result<Vec<ClothPatch>, SceneError> {
     let materials = Materials::parse(&rig.materials)?;
     rig.patches
         .iter()
-        .map(|patch| {
+        .enumerate()
+        .map(|(index, patch)| {
             let chart = &patch.patch.chart;
             Ok(ClothPatch {
                 shape: chart.grid,
                 rest: patch.patch.neutral.iter().map(|q| q.cast()).collect(),
                 material: *materials.get(&chart.material)?,
                 attachments: chart.attachments.iter().map(to_cloth_attachment).collect(),
+                variations: rig.variations.get(index).cloned().unwrap_or_default(),
             })
         })
         .collect()

@@ -129,8 +129,14 @@ impl<R: Real> pulp::NullaryFnOnce for Sweeps<'_, R> {
         };
         let half = R::splat(0.5);
         for _ in 0..SWEEPS {
-            project_bend(&g.lists.triples, &mut g.displacements, &g.inv_masses, &bend);
-            project_shear(
+            project_bend::<R, false>(
+                &g.lists.triples,
+                &mut g.displacements,
+                &g.inv_masses,
+                &bend,
+                &[],
+            );
+            project_shear::<R, false>(
                 &g.lists.diagonals,
                 &mut g.positions,
                 &g.inv_masses,
@@ -138,7 +144,7 @@ impl<R: Real> pulp::NullaryFnOnce for Sweeps<'_, R> {
                 half,
                 half,
             );
-            project_stretch::<R, true>(
+            project_stretch::<R, true, false>(
                 &g.lists.edges,
                 &mut g.positions,
                 &g.inv_masses,

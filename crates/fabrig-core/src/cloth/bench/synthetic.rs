@@ -186,6 +186,7 @@ fn dome(shape: GridShape, index: u32, material: Material) -> ClothPatch {
         rest,
         material,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }
 
@@ -209,6 +210,7 @@ fn ring(shape: GridShape, index: u32) -> ClothPatch {
         rest,
         material: Material::SPHINCTER,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }
 

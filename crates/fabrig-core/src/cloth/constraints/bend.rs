@@ -56,20 +56,30 @@ pub(crate) fn project_triple<R: Real>(
 /// Projects every triple of a grid.
 ///
 /// - `displacements` (mm), `inv_masses` [1/mass]: one per node
+/// - `softness`: factor of each triple's compliance, not read without `IS_VARIED`
 #[inline(always)]
-pub(crate) fn project_bend<R: Real>(
+pub(crate) fn project_bend<R: Real, const IS_VARIED: bool>(
     triples: &[[u32; 3]],
     displacements: &mut [Vec3<R>],
     inv_masses: &[R],
     bend: &BendCompliance<R>,
+    softness: &[R],
 ) {
     let two = R::splat(2.0);
-    for triple in triples {
+    for (index, triple) in triples.iter().enumerate() {
         let &[i, j, k] = triple;
         let (i, j, k) = (i as usize, j as usize, k as usize);
         let w = [inv_masses[i], inv_masses[j], inv_masses[k]];
         let (a, b, c) = (displacements[i], displacements[j], displacements[k]);
-        let lambda = project_triple(a, b, c, w, bend);
+        let lambda = if IS_VARIED {
+            let bend = BendCompliance {
+                compliance: bend.compliance * softness[index],
+                ..*bend
+            };
+            project_triple(a, b, c, w, &bend)
+        } else {
+            project_triple(a, b, c, w, bend)
+        };
         displacements[i] = a + lambda * w[0];
         displacements[j] = b - lambda * (two * w[1]);
         displacements[k] = c + lambda * w[2];
@@ -77,20 +87,24 @@ pub(crate) fn project_bend<R: Real>(
 }
 
 /// Energy of all triples.
+///
+/// - `softness`: factor of each triple's compliance; empty where all are 1
 #[inline(always)]
 pub(crate) fn bend_energy<R: Real>(
     triples: &[[u32; 3]],
     displacements: &[Vec3<R>],
     k: R,
     bend: &BendCompliance<R>,
+    softness: &[R],
 ) -> R {
     let mut sum = R::splat(0.0);
-    for triple in triples {
+    for (index, triple) in triples.iter().enumerate() {
         let &[i, j, l] = triple;
         let (i, j, l) = (i as usize, j as usize, l as usize);
         let s = displacements[i] + displacements[l] - displacements[j] - displacements[j];
         let q = s.dot(s) * bend.inv_edge_squared;
-        sum += q * (R::splat(1.0) - bend.dropoff / (R::splat(1.0) + q));
+        let energy = q * (R::splat(1.0) - bend.dropoff / (R::splat(1.0) + q));
+        sum += softness.get(index).map_or(energy, |&s| energy / s);
     }
     R::splat(0.5) * k / bend.inv_edge_squared * sum
 }
@@ -128,7 +142,8 @@ mod tests {
                 plus[0] += Vec3::splat(e);
                 let mut minus = nodes;
                 minus[0] -= Vec3::splat(e);
-                let slope = (bend_energy(LINE, &plus, k, &b) - bend_energy(LINE, &minus, k, &b))
+                let slope = (bend_energy(LINE, &plus, k, &b, &[])
+                    - bend_energy(LINE, &minus, k, &b, &[]))
                     / (2.0 * step);
                 let f = force.lane(0)[axis];
                 assert!(
@@ -144,7 +159,7 @@ mod tests {
         let mut nodes = [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [2.0, 0.0, 1.0]].map(Vec3::splat);
         let w = [0.5, 0.25, 1.0];
         let start = nodes;
-        project_bend(LINE, &mut nodes, &w, &bend(0.0, 0.2));
+        project_bend::<_, false>(LINE, &mut nodes, &w, &bend(0.0, 0.2), &[]);
         let s: Vec3<f64> = nodes[0] + nodes[2] - nodes[1] - nodes[1];
         assert!(s.dot(s).sqrt() < 1e-12);
         let mut momentum = Vec3::<f64>::zero();

@@ -35,8 +35,10 @@ pub(crate) fn project_diagonal<R: Real>(
 ///
 /// - `positions` (mm), `inv_masses` [1/mass]: one per node
 /// - `progress`: how far through the frame, 0 to 1
+///
+/// Without `IS_VARIED` the diagonals' softness is not read.
 #[inline(always)]
-pub(crate) fn project_shear<R: Real>(
+pub(crate) fn project_shear<R: Real, const IS_VARIED: bool>(
     diagonals: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
@@ -52,7 +54,11 @@ pub(crate) fn project_shear<R: Real>(
             inv_masses[i],
             inv_masses[j],
             rest.at(diagonal, progress),
-            compliance,
+            if IS_VARIED {
+                compliance * rest.softness(diagonal)
+            } else {
+                compliance
+            },
         );
         positions[i] += da;
         positions[j] += db;
@@ -71,7 +77,7 @@ pub(crate) fn shear_energy<R: Real>(
     for (diagonal, &[i, j]) in diagonals.iter().enumerate() {
         let (i, j) = (i as usize, j as usize);
         let c = edge_length(positions[i], positions[j]) - rest.at(diagonal, progress);
-        sum += R::splat(0.5) * k * c * c;
+        sum += R::splat(0.5) * k * c * c / rest.softness(diagonal);
     }
     sum
 }
@@ -114,11 +120,11 @@ mod tests {
             .map(|p| Vec3::splat([p[0] + 0.3 * p[1], p[1], 0.0]))
             .collect();
         let before = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
-        project_shear(&diagonals, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
+        project_shear::<_, false>(&diagonals, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
         let after = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
         assert!(after < 0.05 * before, "{before} -> {after}");
         let mut heap = vec![Vec3::<f64>::zero(); 4];
-        project_shear(&diagonals, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);
+        project_shear::<_, false>(&diagonals, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);
         assert!(heap.iter().all(|p| p.dot(*p).is_finite()));
     }
 }

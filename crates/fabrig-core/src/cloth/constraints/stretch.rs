@@ -30,6 +30,8 @@ pub(crate) struct RestLengths<R> {
     end: Vec<R>,
     /// How far the rest length follows the target, 0 = not at all, 1 = wholly.
     blend: Vec<R>,
+    /// Factor of each edge's compliance; empty where all are 1.
+    softness: Vec<R>,
 }
 
 impl<R: Real> RestLengths<R> {
@@ -44,11 +46,32 @@ impl<R: Real> RestLengths<R> {
             end: lengths.clone(),
             neutral: lengths,
             blend,
+            softness: Vec::new(),
+        }
+    }
+
+    /// The same, with a factor of each edge's compliance; none at all where all are 1.
+    pub(crate) fn with_softness(self, softness: Vec<R>) -> Self {
+        Self { softness, ..self }
+    }
+
+    /// Whether edges differ in softness.
+    pub(crate) fn is_varied(&self) -> bool {
+        !self.softness.is_empty()
+    }
+
+    /// Factor of an edge's compliance.
+    #[inline(always)]
+    pub(crate) fn softness(&self, edge: usize) -> R {
+        if self.is_varied() {
+            self.softness[edge]
+        } else {
+            R::splat(1.0)
         }
     }
 
     /// Starts a frame at whose end the targets are at `targets`. Returns the sum of squares by
-    /// which targets and rest lengths will then differ. [mm^2]
+    /// which targets and rest lengths will then differ, each over its softness. [mm^2]
     #[inline(always)]
     pub(crate) fn begin_frame(&mut self, edges: &[[u32; 2]], targets: &[Vec3<R>]) -> R {
         let mut mismatch = R::splat(0.0);
@@ -59,7 +82,7 @@ impl<R: Real> RestLengths<R> {
             self.start[edge] = self.end[edge];
             self.end[edge] = rest;
             let gap = target - rest;
-            mismatch += gap * gap;
+            mismatch += gap * gap / self.softness(edge);
         }
         mismatch
     }
@@ -93,6 +116,18 @@ pub(crate) struct StretchCompliance<R> {
     pub(crate) compression: R,
     /// Damping of the constraint relative to its stiffness, beta/(k h_e).
     pub(crate) gamma: R,
+}
+
+impl<R: Real> StretchCompliance<R> {
+    /// Of an edge whose compliance has a factor; its damping stays the same share of it.
+    #[inline(always)]
+    fn softened(&self, softness: R) -> Self {
+        Self {
+            stretch: self.stretch * softness,
+            compression: self.compression * softness,
+            gamma: self.gamma,
+        }
+    }
 }
 
 /// Projects one edge.
@@ -132,9 +167,10 @@ pub(crate) fn project_edge<R: Real>(
 /// - `positions`, `resting` (mm), `inv_masses` [1/mass]: one per node; see [`project_edge`]
 /// - `progress`: how far through the frame, 0 to 1
 ///
-/// Without `IS_DAMPED` the compliance's damping counts as zero, and `resting` is not read.
+/// Without `IS_DAMPED` the compliance's damping counts as zero, and `resting` is not read;
+/// without `IS_VARIED` the edges' softness is not.
 #[inline(always)]
-pub(crate) fn project_stretch<R: Real, const IS_DAMPED: bool>(
+pub(crate) fn project_stretch<R: Real, const IS_DAMPED: bool, const IS_VARIED: bool>(
     edges: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
@@ -153,6 +189,11 @@ pub(crate) fn project_stretch<R: Real, const IS_DAMPED: bool>(
     };
     for (edge, &[i, j]) in edges.iter().enumerate() {
         let (i, j) = (i as usize, j as usize);
+        let compliance = if IS_VARIED {
+            compliance.softened(rest.softness[edge])
+        } else {
+            compliance
+        };
         let (a, b) = project_edge(
             positions[i],
             positions[j],
@@ -184,8 +225,9 @@ pub(crate) fn stretch_energy<R: Real>(
     for (edge, &[i, j]) in edges.iter().enumerate() {
         let (a, b) = (positions[i as usize], positions[j as usize]);
         let [s, c] = edge_energy(a, b, rest.at(edge, progress), k);
-        sums[0] += s;
-        sums[1] += c;
+        let softness = rest.softness(edge);
+        sums[0] += s / softness;
+        sums[1] += c / softness;
     }
     sums
 }

@@ -186,7 +186,8 @@ impl<R: Real> Group<R> {
             for &[edge, other] in &incidence.edges[i] {
                 let d = x - self.solution[other as usize];
                 let rest = self.edge_lengths.at(edge as usize, progress);
-                let k = spring(&mut block, d, rest, stiff);
+                let softness = self.edge_lengths.softness(edge as usize);
+                let k = spring(&mut block, d, rest, stiff.map(|k| k / softness));
                 let resting = self.resting[i] - self.resting[other as usize];
                 let inv = one / d.dot(d).max(R::splat(SHORTEST * SHORTEST));
                 let drag = k * gamma * inv;
@@ -196,7 +197,8 @@ impl<R: Real> Group<R> {
             for &[diagonal, other] in &incidence.diagonals[i] {
                 let d = x - self.solution[other as usize];
                 let rest = self.diagonal_lengths.at(diagonal as usize, progress);
-                spring(&mut block, d, rest, shear);
+                let softness = self.diagonal_lengths.softness(diagonal as usize);
+                spring(&mut block, d, rest, shear.map(|k| k / softness));
             }
             for &(triple, is_middle) in &incidence.triples[i] {
                 let [a, b, c] = self.lists.triples[triple as usize];
@@ -206,14 +208,18 @@ impl<R: Real> Group<R> {
                 let uc = self.solution[c] - self.targets[c];
                 let s = ua + uc - ub * two;
                 let turned = one + s.dot(s) * self.inv_edge_squared;
-                let k = bend * (one - self.bend_dropoff / (turned * turned));
+                let stiff = match self.bend_softness.get(triple as usize) {
+                    Some(&softness) => bend / softness,
+                    None => bend,
+                };
+                let k = stiff * (one - self.bend_dropoff / (turned * turned));
                 if is_middle {
                     block.gradient += s * -(two * k);
                     // Without the dropoff it bounds the energy's second derivative.
-                    block.add(four * bend, zero, s);
+                    block.add(four * stiff, zero, s);
                 } else {
                     block.gradient += s * k;
-                    block.add(bend, zero, s);
+                    block.add(stiff, zero, s);
                 }
             }
             if self.has_pressure {
@@ -268,7 +274,13 @@ impl<R: Real> Group<R> {
             dropoff: self.bend_dropoff,
             inv_edge_squared: self.inv_edge_squared,
         };
-        let bend = bend_energy(&self.lists.triples, &self.scratch, self.bend, &bend);
+        let bend = bend_energy(
+            &self.lists.triples,
+            &self.scratch,
+            self.bend,
+            &bend,
+            &self.bend_softness,
+        );
         let mut elastic = stretch + compression + shear + bend;
         if self.has_pressure {
             elastic += half * self.pressure * volume * volume;
@@ -289,7 +301,7 @@ impl<R: Real> Group<R> {
             let rate = d.dot(d - (self.resting[i] - self.resting[j]));
             let rest = self.edge_lengths.at(edge, progress);
             let k = R::select_less(squared, rest * rest, self.stretch[1], self.stretch[0]);
-            sum += k * rate * rate / squared;
+            sum += k * rate * rate / (squared * self.edge_lengths.softness(edge));
         }
         R::splat(0.5) * gamma * sum
     }

@@ -114,7 +114,13 @@ impl<R: Real> Group<R> {
             dropoff: self.bend_dropoff,
             inv_edge_squared: self.inv_edge_squared,
         };
-        let bend = bend_energy(&self.lists.triples, &self.displacements, self.bend, &bend);
+        let bend = bend_energy(
+            &self.lists.triples,
+            &self.displacements,
+            self.bend,
+            &bend,
+            &self.bend_softness,
+        );
         let mut pressure = R::splat(0.0);
         if self.has_pressure {
             let volume = swept_volume(

@@ -46,6 +46,7 @@ impl<R: Real> Group<R> {
     /// - `progress`: how far through the frame, 0 to 1
     #[inline(always)]
     pub(super) fn sweep_once(&mut self, progress: R, compliance: &SweepCompliance<R>) {
+        let is_varied = self.edge_lengths.is_varied();
         if self.has_pressure {
             project_pressure(
                 &self.lists.cells,
@@ -62,40 +63,43 @@ impl<R: Real> Group<R> {
                 dropoff: self.bend_dropoff,
                 inv_edge_squared: self.inv_edge_squared,
             };
-            project_bend(
-                &self.lists.triples,
-                &mut self.solution,
-                &self.inv_masses,
-                &bend,
-            );
+            let (triples, x) = (&self.lists.triples, &mut self.solution);
+            let (w, softness) = (&self.inv_masses, &self.bend_softness);
+            if is_varied {
+                project_bend::<R, true>(triples, x, w, &bend, softness);
+            } else {
+                project_bend::<R, false>(triples, x, w, &bend, softness);
+            }
         }
         for (x, target) in self.solution.iter_mut().zip(&self.targets) {
             *x = *target + *x;
         }
         if self.has_shear {
-            project_shear(
-                &self.lists.diagonals,
-                &mut self.solution,
-                &self.inv_masses,
-                &self.diagonal_lengths,
-                progress,
-                compliance.shear,
-            );
+            let (diagonals, x) = (&self.lists.diagonals, &mut self.solution);
+            let (w, lengths) = (&self.inv_masses, &self.diagonal_lengths);
+            let shear = compliance.shear;
+            if is_varied {
+                project_shear::<R, true>(diagonals, x, w, lengths, progress, shear);
+            } else {
+                project_shear::<R, false>(diagonals, x, w, lengths, progress, shear);
+            }
         }
-        if self.has_stretch_damping {
-            self.stretch_all::<true>(progress, &compliance.stretch);
+        if is_varied {
+            self.stretch_all::<true, true>(progress, &compliance.stretch);
+        } else if self.has_stretch_damping {
+            self.stretch_all::<true, false>(progress, &compliance.stretch);
         } else {
-            self.stretch_all::<false>(progress, &compliance.stretch);
+            self.stretch_all::<false, false>(progress, &compliance.stretch);
         }
     }
 
     #[inline(always)]
-    fn stretch_all<const IS_DAMPED: bool>(
+    fn stretch_all<const IS_DAMPED: bool, const IS_VARIED: bool>(
         &mut self,
         progress: R,
         compliance: &StretchCompliance<R>,
     ) {
-        project_stretch::<R, IS_DAMPED>(
+        project_stretch::<R, IS_DAMPED, IS_VARIED>(
             &self.lists.edges,
             &mut self.solution,
             &self.inv_masses,

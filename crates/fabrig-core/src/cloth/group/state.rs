@@ -10,7 +10,9 @@ use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::magnet::Magnet;
 use crate::cloth::constraints::stretch::{RestLengths, edge_length};
 use crate::cloth::constraints::wind::Air;
-use crate::cloth::input::{ClothAttachment, ClothOptions, ClothPatch, Integrator, Mode};
+use crate::cloth::input::{
+    ClothAttachment, ClothOptions, ClothPatch, Integrator, Mode, NodeVariation,
+};
 use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::materials::Material;
 
@@ -67,6 +69,8 @@ pub(crate) struct Group<R> {
     pub(super) lists: GridLists,
     pub(super) edge_lengths: RestLengths<R>,
     pub(super) diagonal_lengths: RestLengths<R>,
+    /// Factor of each triple's compliance; empty where all are 1.
+    pub(super) bend_softness: Vec<R>,
 
     pub(super) displacements: Vec<Vec3<R>>,
     pub(super) previous_displacements: Vec<Vec3<R>>,
@@ -161,16 +165,33 @@ impl<R: Real> Group<R> {
         let lists = GridLists::new(shape);
         let mean_edge = mean_edge(&lists.edges, &rest);
         let (anchors, anchor_stiffness) = anchors(all, patches, &rest);
-        let blends = |edges: &[[u32; 2]]| -> Vec<R> {
-            edges
-                .iter()
-                .map(|&[i, j]| {
-                    let noise = edge_noise(options.seed, i, j);
-                    let blend = options.rest_blend * (1.0 + options.rest_imperfection * noise);
-                    R::splat(blend.clamp(0.0, 1.0))
-                })
+        // What the variations of a constraint's nodes come to, lane by lane.
+        let varied = |nodes: &[u32], factor: fn(&NodeVariation) -> f32| {
+            per_lane(&|p: &ClothPatch| mean_factor(&p.variations, nodes, factor))
+        };
+        let lengths = |edges: &[[u32; 2]]| -> RestLengths<R> {
+            let blend = edges.iter().map(|edge| {
+                let noise = edge_noise(options.seed, edge[0], edge[1]);
+                let blend = options.rest_blend * (1.0 + options.rest_imperfection * noise);
+                R::splat(blend.clamp(0.0, 1.0)) * varied(edge, |v| v.rest_blend)
+            });
+            RestLengths::new(&rest, edges, blend.collect())
+        };
+        let softness = |of: &mut dyn Iterator<Item = &[u32]>, factor| -> Vec<R> {
+            let is_varied = patches.iter().any(|&p| !all[p].variations.is_empty());
+            of.filter(|_| is_varied)
+                .map(|nodes| R::splat(1.0) / varied(nodes, factor))
                 .collect()
         };
+        let stretch_softness = |edges: &[[u32; 2]]| {
+            softness(&mut edges.iter().map(<[u32; 2]>::as_slice), |v| v.stretch)
+        };
+        let bend_softness = softness(&mut lists.triples.iter().map(<[u32; 3]>::as_slice), |v| {
+            v.bend
+        });
+        let edge_lengths = lengths(&lists.edges).with_softness(stretch_softness(&lists.edges));
+        let diagonal_lengths =
+            lengths(&lists.diagonals).with_softness(stretch_softness(&lists.diagonals));
         let has = |number: &dyn Fn(&Material) -> f64| {
             patches.iter().any(|&p| number(&all[p].material) > 0.0)
         };
@@ -220,8 +241,9 @@ impl<R: Real> Group<R> {
             anchor_stiffness,
             anchors,
             pairs: PairTable::default(),
-            edge_lengths: RestLengths::new(&rest, &lists.edges, blends(&lists.edges)),
-            diagonal_lengths: RestLengths::new(&rest, &lists.diagonals, blends(&lists.diagonals)),
+            edge_lengths,
+            diagonal_lengths,
+            bend_softness,
             lists,
             displacements: zero.clone(),
             previous_displacements: zero.clone(),
@@ -281,6 +303,22 @@ impl ClothPatch {
             _ => None,
         })
     }
+}
+
+/// Mean of a factor over some nodes of a patch; 1 where the patch has no variations.
+fn mean_factor(
+    variations: &[NodeVariation],
+    nodes: &[u32],
+    factor: fn(&NodeVariation) -> f32,
+) -> f64 {
+    if variations.is_empty() {
+        return 1.0;
+    }
+    let sum: f64 = nodes
+        .iter()
+        .map(|&i| f64::from(factor(&variations[i as usize])))
+        .sum();
+    sum / nodes.len() as f64
 }
 
 /// A position relative to a centre.

@@ -128,7 +128,8 @@ impl<R: Real> Group<R> {
     fn sweep_bend(&mut self, compliance: R, multipliers: &mut [Vec3<R>]) {
         let (one, two, four) = (R::splat(1.0), R::splat(2.0), R::splat(4.0));
         let x = &mut self.solution;
-        for (&[i, j, k], multiplier) in self.lists.triples.iter().zip(multipliers) {
+        let triples = self.lists.triples.iter().zip(multipliers);
+        for (index, (&[i, j, k], multiplier)) in triples.enumerate() {
             let (i, j, k) = (i as usize, j as usize, k as usize);
             let s = x[i] + x[k] - x[j] - x[j];
             let turned = one + s.dot(s) * self.inv_edge_squared;
@@ -136,6 +137,10 @@ impl<R: Real> Group<R> {
             // Everything times the share of the stiffness that the dropoff leaves, so that no
             // stiffness is no infinity.
             let part = (turned - self.bend_dropoff) / turned;
+            let compliance = match self.bend_softness.get(index) {
+                Some(&softness) => compliance * softness,
+                None => compliance,
+            };
             let soft = R::select_less(compliance, R::splat(1e30), compliance, R::splat(1e30));
             let sum = self.inv_masses[i] + self.inv_masses[k] + four * self.inv_masses[j];
             let change = (s * part + *multiplier * soft) * -(one / (sum * part + soft));
@@ -164,7 +169,8 @@ fn sweep_lengths<R: Real>(
         let d = x[i] - x[j];
         let length = d.dot(d).sqrt().max(R::splat(SHORTEST));
         let c = length - rest.at(edge, progress);
-        let alpha = R::select_less(c, zero, compliance.compression, compliance.stretch);
+        let alpha = R::select_less(c, zero, compliance.compression, compliance.stretch)
+            * rest.softness(edge);
         let alpha = R::select_less(alpha, R::splat(1e30), alpha, R::splat(1e30));
         let drift = compliance.gamma * (d.dot(d - (resting[i] - resting[j])) / length);
         let bottom = (inv_masses[i] + inv_masses[j]) * (one + compliance.gamma) + alpha;

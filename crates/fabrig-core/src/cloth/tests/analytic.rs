@@ -100,6 +100,7 @@ fn chain(count: u32, resistance: f64) -> ClothPatch {
             damping: 12.0,
             ..magnet_only(0.0, 0.0)
         },
+        variations: Vec::new(),
         attachments: vec![ClothAttachment::Anchors {
             nodes: vec![0],
             strength: 1e4,

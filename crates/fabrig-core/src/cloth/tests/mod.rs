@@ -6,3 +6,4 @@ mod determinism;
 mod equilibrium;
 mod hard_cases;
 mod support;
+mod variations;

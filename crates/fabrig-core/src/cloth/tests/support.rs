@@ -35,6 +35,7 @@ pub(super) fn ring(material: Material) -> ClothPatch {
         rest,
         material,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }
 
@@ -95,5 +96,6 @@ pub(super) fn single(material: Material) -> ClothPatch {
         rest: vec![Point3::origin()],
         material,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }

@@ -39,6 +39,7 @@ pub(crate) fn dome_at(
         rest,
         material,
         attachments: Vec::new(),
+        variations: Vec::new(),
     }
 }
 
