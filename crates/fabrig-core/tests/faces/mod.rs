@@ -1,11 +1,14 @@
 //! Rigs that several tests share: the template as a user's face, and the demo face.
 #![allow(dead_code)]
 
+pub(crate) mod stage;
+
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
 use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::read_mesh;
+use fabrig_core::registration::bench::Specimen;
 use fabrig_core::registration::{Registration, RegistrationOptions, register};
 use fabrig_core::rig::{FaceOnTemplate, Rig, RigOptions, build, places_of_self};
 use fabrig_core::scene::FacePose;
@@ -100,6 +103,25 @@ static ICT: LazyLock<Option<RiggedFace>> = LazyLock::new(|| {
 /// The demo face, registered and rigged once per test binary.
 pub(crate) fn demo() -> &'static RiggedFace {
     &DEMO
+}
+
+/// A face that is no man's: long nose and chin, heavy brow, remeshed so that it shares no vertex
+/// with the template.
+static GOBLIN: LazyLock<RiggedFace> = LazyLock::new(|| {
+    let template = template::human();
+    let goblin = template::people().iter().find(|p| p.name == "goblin");
+    let specimen = Specimen::person(template, goblin.expect("there is a goblin")).remeshed();
+    RiggedFace::new("goblin", specimen.mesh().expect("a mesh"))
+});
+
+/// A face that is not human, registered and rigged once per test binary.
+pub(crate) fn goblin() -> &'static RiggedFace {
+    &GOBLIN
+}
+
+/// [`subjects`], and the goblin.
+pub(crate) fn all_subjects() -> impl Iterator<Item = &'static RiggedFace> {
+    subjects().chain([goblin()])
 }
 
 /// The demo face, and ict_neutral where `FABRIG_SHARED` is set.
