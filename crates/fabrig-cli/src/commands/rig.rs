@@ -48,6 +48,7 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
     if let Some(own) = &own {
         options.expressions.clone_from(&own.expressions);
         options.expressions_on.clone_from(&own.neutral);
+        options.scans.clone_from(&own.scans);
     }
     let rigged = rig_on(console, &face, &template, &options)
         .with_context(|| format!("{} was not rigged", args.face.display()))?;
@@ -106,12 +107,26 @@ fn print_own_shapes(console: &Console, own: &OwnShapes, template: &Template, rig
         "{:<20}{}, amplitudes of the patches {:.2} to {:.2}, median {:.2}; the jaw opens {:.2} times \
          as far",
         "own shapes",
-        own.expressions.len(),
+        own.expressions.len() + rigged.scans.iter().filter(|s| s.problem.is_none()).count(),
         alphas.first().unwrap_or(&1.0),
         alphas.last().unwrap_or(&1.0),
         alphas.get(alphas.len() / 2).unwrap_or(&1.0),
         open,
     ));
+    for scan in &rigged.scans {
+        let (Some(amplitude), Some(distance)) = (scan.amplitude, &scan.distance) else {
+            continue;
+        };
+        console.result(&format!(
+            "{:<20}{}: {} at {amplitude:.2} times the template's amplitude, median {:.2}  95% \
+             {:.2} mm from it",
+            "scan",
+            scan.path.display(),
+            scan.name,
+            distance.median,
+            distance.p95,
+        ));
+    }
     for (path, reason) in &own.skipped {
         console.result(&format!(
             "{:<20}{} passed over: {reason}",

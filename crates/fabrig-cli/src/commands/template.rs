@@ -84,6 +84,7 @@ fn build_own(console: &Console, args: &TemplateBuildArgs) -> Result<Outcome> {
     })?;
     let neutral = read_mesh(&path)?;
     let own = read_own_shapes(&args.source, &neutral, base)
+        .and_then(|own| own.without_scans(&neutral))
         .with_context(|| format!("shapes of {}", path.display()))?;
     let mut registration = RegistrationOptions::default();
     if let Some(path) = &args.landmarks {

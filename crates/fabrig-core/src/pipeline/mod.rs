@@ -24,6 +24,7 @@ mod contact;
 mod cost;
 mod frames;
 mod live;
+mod expression_scans;
 mod own_shapes;
 mod own_template;
 mod rig_face;
@@ -36,6 +37,7 @@ pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recor
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
 pub use live::LiveFace;
+pub use expression_scans::{ExpressionScan, ScanReport};
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::ExpressionScan;
 use crate::facs::{ARKIT_SHAPES, ShapeMatch, match_shape};
 use crate::mesh::Mesh;
 use crate::mesh::io::{MeshIoError, MeshShape, read_mesh, read_mesh_with_shapes};
@@ -15,6 +16,8 @@ use crate::template::Template;
 pub struct OwnShapes {
     /// In the order of file names, or of the file's morph targets.
     pub expressions: Vec<Expression>,
+    /// Those on a mesh of their own: scans.
+    pub scans: Vec<ExpressionScan>,
     /// Meshes and morph targets (`face.glb#hat`) that were passed over, and why.
     pub skipped: Vec<(PathBuf, String)>,
     /// The mesh that the expressions are on, at rest, where it is another than the face: they
@@ -77,6 +80,24 @@ pub enum OwnShapesError {
     },
 }
 
+impl OwnShapes {
+    /// The same, if all expressions are on the neutral's mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`OwnShapesError::VertexCount`] with the first scan.
+    pub fn without_scans(self, neutral: &Mesh) -> Result<Self, OwnShapesError> {
+        match self.scans.first() {
+            None => Ok(self),
+            Some(scan) => Err(OwnShapesError::VertexCount {
+                path: scan.path.clone(),
+                expected: self.neutral.as_ref().unwrap_or(neutral).vertex_count(),
+                found: scan.mesh.vertex_count(),
+            }),
+        }
+    }
+}
+
 const EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
 
 /// A vertex of a file with morph targets may be this far from the neutral face, as a share of
@@ -86,8 +107,8 @@ const REST_TOLERANCE: f64 = 1e-4;
 /// Reads the shapes of a face that are shapes of the template too: every mesh of a folder that
 /// is named like one, or every morph target of a glTF file.
 ///
-/// Shapes may be on another mesh of the same face, where the folder has that mesh at rest; a
-/// shape that comes as two halves (ICT-FaceKit's `browInnerUp_L` and `_R`) is their sum.
+/// Shapes may be on another mesh of the same face, where the folder has that mesh at rest. A mesh
+/// with another number of vertices is taken for a scan with a topology of its own. A shape that comes as two halves (ICT-FaceKit's `browInnerUp_L` and `_R`) is their sum.
 ///
 /// - `source`: the folder or file
 /// - `neutral`: the face at rest
@@ -106,7 +127,7 @@ pub fn read_own_shapes(
     } else {
         read_folder(source, neutral, template, &mut found)?;
     }
-    if found.expressions.is_empty() {
+    if found.expressions.is_empty() && found.scans.is_empty() {
         return Err(OwnShapesError::Nothing {
             path: source.to_owned(),
         });
@@ -142,12 +163,20 @@ fn read_folder(
             continue;
         };
         let mesh = read_mesh(&path)?;
-        check_count(&path, &mesh, neutral)?;
-        found.expressions.push(Expression {
-            name,
-            weights,
-            positions: mesh.positions().to_vec(),
-        });
+        if mesh.vertex_count() == neutral.vertex_count() {
+            found.expressions.push(Expression {
+                name,
+                weights,
+                positions: mesh.positions().to_vec(),
+            });
+        } else {
+            found.scans.push(ExpressionScan {
+                name,
+                weights,
+                mesh,
+                path,
+            });
+        }
     }
     for (whole, mut parts) in halves {
         let Some((name, weights)) = shapes_of_name(whole, template) else {
@@ -357,7 +386,10 @@ mod tests {
         );
         assert_eq!(found.neutral, None);
         write("jawOpen.obj", &square);
-        let error = read_own_shapes(&folder, &neutral, template).unwrap_err();
+        let found = read_own_shapes(&folder, &neutral, template).unwrap();
+        assert_eq!(found.scans.len(), 1, "a mesh of its own is a scan");
+        assert_eq!(found.scans[0].name, "jawOpen");
+        let error = found.without_scans(&neutral).unwrap_err();
         assert!(
             error.to_string().contains("jawOpen.obj has 4 vertices"),
             "{error}"

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use super::expression_scans::{ExpressionScan, ScanReport, examples_of_scans};
 use crate::Error;
 use crate::mesh::{Mesh, VertexOrigin};
 use crate::registration::{
@@ -28,6 +29,9 @@ pub struct RigFaceOptions {
     /// The mesh at rest that the expressions are on, where it is another mesh of the same face;
     /// it is registered by itself.
     pub expressions_on: Option<Mesh>,
+    /// Expressions of this face on meshes of their own, in the units of the mesh that the other
+    /// expressions are on.
+    pub scans: Vec<ExpressionScan>,
 }
 
 /// A face with its rig.
@@ -39,6 +43,8 @@ pub struct RiggedFace {
     pub normalized: Mesh,
     /// Where the vertices and polygons of a cut mesh come from, if anything was cut.
     pub cut: Option<CutOrigins>,
+    /// What came of the scans of expressions, one each.
+    pub scans: Vec<ScanReport>,
     /// What registration measured; the time of building the rig is its last stage.
     pub report: RegistrationReport,
 }
@@ -84,19 +90,35 @@ pub fn rig_face(
         return Err(crate::registration::RegistrationError::Cancelled { stage: "build" }.into());
     }
     let clock = Instant::now();
-    let examples = match &options.expressions_on {
-        None => carry_expressions(face, &registration, template, &options.expressions)?,
+    let own_registration = match &options.expressions_on {
+        None => None,
         Some(other) => {
             let automatic = RegistrationOptions::default();
-            let own = register(other, template, &automatic, &mut |step| {
+            Some(register(other, template, &automatic, &mut |step| {
                 progress(Progress {
                     fraction: REGISTRATION_SHARE,
                     ..step
                 })
-            })?;
-            carry_expressions(other, &own, template, &options.expressions)?
+            })?)
         }
     };
+    let shown_on = options.expressions_on.as_ref().unwrap_or(face);
+    let shown_by = own_registration.as_ref().unwrap_or(&registration);
+    let mut examples = carry_expressions(shown_on, shown_by, template, &options.expressions)?;
+    let (scanned, scans) = examples_of_scans(
+        &options.scans,
+        shown_by,
+        template,
+        &options.rig,
+        &mut |step| {
+            let share = 1.0 - REGISTRATION_SHARE;
+            progress(Progress {
+                fraction: REGISTRATION_SHARE + share * step.fraction,
+                ..step
+            })
+        },
+    )?;
+    examples.extend(scanned);
     let mut registration = registration;
     let mut cut_mesh = None;
     let mut origins = None;
@@ -128,6 +150,14 @@ pub fn rig_face(
             other => format!("{other} moves nothing on this face"),
         });
     }
+    for scan in &scans {
+        if let Some(problem) = &scan.problem {
+            let path = scan.path.display();
+            report
+                .warnings
+                .push(format!("{path} is not used: {problem}"));
+        }
+    }
     report.times.push(StageTime {
         stage: "build".to_owned(),
         seconds: clock.elapsed().as_secs_f64(),
@@ -136,6 +166,7 @@ pub fn rig_face(
         rig,
         normalized,
         cut: origins,
+        scans,
         report,
     })
 }

@@ -63,6 +63,15 @@ pub enum RegistrationError {
         /// Landmarks to give.
         landmarks: Vec<String>,
     },
+    /// A scan of an expression does not come to lie on the face that it should be of.
+    #[error(
+        "the scan is not this face in this expression: {distance_mm:.2} mm from it in the median \
+         after everything was tried; check its name, and that it is in the neutral's units"
+    )]
+    OtherFace {
+        /// Median distance. (mm)
+        distance_mm: f64,
+    },
     /// Too little is left after cleaning.
     #[error(
         "the face has {triangle_count} usable triangles after cleaning, at least {expected} are needed"

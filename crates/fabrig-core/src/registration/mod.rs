@@ -9,6 +9,8 @@
 //!    and eyes by `openings`.
 //! 5. `mapping` from the user's vertices to the template, `parts` that are not skin, `report`.
 //!
+//! A scan of an expression of a face that is registered follows by `expression_scan`.
+//!
 //! The user's mesh stays the skin; the registered template only carries anatomy to it.
 //!
 //! # Limits
@@ -22,6 +24,7 @@ mod clean;
 mod closest_grid;
 mod cut;
 mod error;
+mod expression_scan;
 mod face_model;
 mod identity_fit;
 mod landmarks;
@@ -43,6 +46,7 @@ mod target;
 pub use clean::{CleaningReport, Sphere};
 pub use cut::{CutFace, CutSeams, SeamCut, cut_seams};
 pub use error::RegistrationError;
+pub use expression_scan::{RegisteredExpression, register_expression};
 pub use landmarks::{LandmarkFileError, LandmarkOrder, parse_landmarks, read_landmarks};
 pub use parts::RigidComponent;
 pub use register::{Progress, Registration, RegistrationOptions, register};

@@ -459,7 +459,7 @@ fn landmark_rms(
 }
 
 /// The chosen piece alone, in the head frame.
-fn target_of(
+pub(super) fn target_of(
     cleaned: &CleanMesh,
     piece: usize,
     to_head: &Similarity3<f64>,
@@ -509,7 +509,7 @@ impl Pins {
 }
 
 /// Where one sees lips and lids part.
-struct Seams {
+pub(super) struct Seams {
     /// On the template as far as it has been deformed.
     own: Vec<Parting>,
     /// On the face.
@@ -517,7 +517,7 @@ struct Seams {
 }
 
 impl Seams {
-    fn find(
+    pub(super) fn find(
         model: &FaceModel<'_>,
         target: &Target,
         vertices: &[Point],
@@ -529,7 +529,7 @@ impl Seams {
         })
     }
 
-    fn pins(&self, model: &FaceModel<'_>) -> Vec<Pin> {
+    pub(super) fn pins(&self, model: &FaceModel<'_>) -> Vec<Pin> {
         parting_pins(model, &self.own, &self.face, SEAM_WEIGHT)
     }
 }

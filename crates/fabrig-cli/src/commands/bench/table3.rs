@@ -78,6 +78,7 @@ fn read_face(console: &Console, source: &Path, template: &Template) -> Result<Ow
     })?;
     let neutral = read_mesh(&path)?;
     let own = read_own_shapes(source, &neutral, template)
+        .and_then(|own| own.without_scans(&neutral))
         .with_context(|| format!("shapes of {}", path.display()))?;
     for (path, reason) in &own.skipped {
         console.note(&format!("{} passed over: {reason}", path.display()));
