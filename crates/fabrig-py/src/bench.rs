@@ -263,12 +263,13 @@ pub(crate) fn bench_table3<'py>(
         Some(faces) => {
             let each = faces.into_iter().map(|(name, neutral, expressions)| {
                 let neutral = PyMesh::of(&neutral)?.get().inner.clone();
-                let (expressions, other) = own_expressions(py, &expressions, &neutral, &template)?;
+                let own = own_expressions(py, &expressions, &neutral, &template)?;
+                let own = own.without_scans(&neutral).map_err(to_py)?;
                 Ok(OwnFace {
                     name,
                     is_synthetic: false,
-                    neutral: other.unwrap_or(neutral),
-                    expressions,
+                    neutral: own.neutral.unwrap_or(neutral),
+                    expressions: own.expressions,
                 })
             });
             each.collect::<PyResult<Vec<_>>>()?

@@ -8,7 +8,9 @@ use fabrig_core::anatomy::Resolution;
 use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
-use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions, read_own_shapes, rig_face};
+use fabrig_core::pipeline::{
+    AnimateOptions, ExpressionScan, OwnShapes, RigFaceOptions, read_own_shapes, rig_face,
+};
 use fabrig_core::recording::RecordedKind;
 use fabrig_core::rig::Expression;
 use fabrig_core::template::Template;
@@ -38,7 +40,8 @@ use crate::template::template_of;
 /// - `cut_seams`: of "mouth" and "eyes" those to cut apart where they are one fused surface; new
 ///   vertices follow those given
 /// - `expressions`: shape -> vertices (N, 3) of this very face, in ARKit's names, to fit the
-///   muscles to; or the folder or glTF file that has them
+///   muscles to; a `Mesh` of its own instead of vertices is a scan, which is registered; or the
+///   folder or glTF file that has them
 /// - `alpha`: what is made of them: one amplitude a "patch", or a patch and "shape", a linear
 ///   "map", or their "own" shapes as they are
 /// - `offsets`: how the template's displacements are put on the face, "global", "frame" or
@@ -117,8 +120,10 @@ pub(crate) fn rig(
     options.rig.resolution = one_of("resolution", resolution, &RESOLUTIONS)?;
     let template = template_of(template)?;
     if let Some(expressions) = expressions {
-        (options.expressions, options.expressions_on) =
-            own_expressions(py, expressions, &face, &template)?;
+        let own = own_expressions(py, expressions, &face, &template)?;
+        options.expressions = own.expressions;
+        options.expressions_on = own.neutral;
+        options.scans = own.scans;
     }
     let mut progress = Progress::new(py, progress)?;
     let rigged = py.detach(|| {
@@ -138,25 +143,46 @@ pub(crate) fn rig(
     })
 }
 
-/// The face's own expressions, and the mesh that they are on where it is another one.
+/// The face's own expressions, scans, and the mesh that they are on where it is another one.
 pub(crate) fn own_expressions(
     py: Python<'_>,
     value: &Bound<'_, PyAny>,
     face: &Mesh,
     template: &Template,
-) -> PyResult<(Vec<Expression>, Option<Mesh>)> {
+) -> PyResult<OwnShapes> {
     if let Ok(source) = value.extract::<PathBuf>() {
-        let own = py.detach(|| read_own_shapes(&source, face, template));
-        let own = own.map_err(to_py)?;
-        return Ok((own.expressions, own.neutral));
+        return py
+            .detach(|| read_own_shapes(&source, face, template))
+            .map_err(to_py);
     }
     let named: BTreeMap<String, Bound<'_, PyAny>> = value
         .extract()
         .map_err(|_| input("expressions: expected shape -> vertices, a folder or a glTF file"))?;
-    let each = named
-        .into_iter()
-        .map(|(name, vertices)| expression(name, &vertices, template));
-    Ok((each.collect::<PyResult<_>>()?, None))
+    let mut own = OwnShapes::default();
+    for (name, given) in named {
+        let weights = shape_weights(&name, template)?;
+        match given.cast::<PyMesh>() {
+            Ok(mesh) if mesh.get().inner.vertex_count() != face.vertex_count() => {
+                own.scans.push(ExpressionScan {
+                    path: mesh.get().source.clone().unwrap_or_else(|| (&name).into()),
+                    mesh: mesh.get().inner.clone(),
+                    name,
+                    weights,
+                });
+            }
+            Ok(mesh) => own.expressions.push(Expression {
+                positions: mesh.get().inner.positions().to_vec(),
+                name,
+                weights,
+            }),
+            Err(_) => own.expressions.push(Expression {
+                positions: arrays::points(&format!("expressions['{name}']"), &given)?,
+                name,
+                weights,
+            }),
+        }
+    }
+    Ok(own)
 }
 
 const ALPHA_MODES: [(&str, AlphaMode); 4] = [
@@ -210,31 +236,23 @@ pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -
         })
 }
 
-/// One of the face's own shapes, by its name.
-fn expression(
-    name: String,
-    vertices: &Bound<'_, PyAny>,
-    template: &Template,
-) -> PyResult<Expression> {
+/// The weights of the template's shapes that a name means.
+fn shape_weights(name: &str, template: &Template) -> PyResult<Vec<f32>> {
     let shapes = &template.shapes;
     let mut weights = vec![0.0; shapes.len()];
-    let names = match_shape(&name).map_or_else(Vec::new, ShapeMatch::names);
+    let names = match_shape(name).map_or_else(Vec::new, ShapeMatch::names);
     for (shape, weight) in shapes.iter().zip(&mut weights) {
         if names.contains(&shape.name.as_str()) {
             *weight = 1.0;
         }
     }
     if names.is_empty() {
-        let nearest = nearest_name(&name, ARKIT_SHAPES).unwrap_or_default();
+        let nearest = nearest_name(name, ARKIT_SHAPES).unwrap_or_default();
         return Err(input(format!(
             "expressions: '{name}' is no shape of ARKit (nearest: '{nearest}')"
         )));
     }
-    Ok(Expression {
-        positions: arrays::points(&format!("expressions['{name}']"), vertices)?,
-        name,
-        weights,
-    })
+    Ok(weights)
 }
 
 /// Simulates a rig through a take and records it to an MCAP file; returns a report.

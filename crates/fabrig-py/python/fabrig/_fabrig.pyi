@@ -461,7 +461,7 @@ def rig(
     unit: str | float | None = None,
     min_confidence: float | None = None,
     cut_seams: Sequence[str] | None = None,
-    expressions: Mapping[str, ArrayLike] | Path | None = None,
+    expressions: Mapping[str, ArrayLike | Mesh] | Path | None = None,
     alpha: str = "own",
     offsets: str = "global",
     jaw: str = "hinge",

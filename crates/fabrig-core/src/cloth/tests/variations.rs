@@ -119,7 +119,9 @@ fn skin_folds_where_its_lengths_stay_and_as_widely_as_its_stiffness_says() {
         material.bend_stiffness() * f64::from(loose.bend) * (1.0 - material.bend_angle_dropoff);
     let x = (material.magnet_stiffness() / bend).sqrt();
     let expected = std::f64::consts::TAU / (1.0 - x / 2.0).acos();
-    let turns = folded.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0);
+    let turns = folded
+        .windows(3)
+        .filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0);
     let turns = turns.count();
     let wavelength = 2.0 * folded.len() as f64 / turns as f64;
     assert!(
