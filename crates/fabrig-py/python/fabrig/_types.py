@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 # Unions are spelled so that Python 3.10 makes them where one side is a string or None.
-Path = Union[str, "PathLike[str]"]
+Path = Union[str, PathLike[str]]
 Progress = Union[bool, Callable[[str, float], Any], None]
 Faces = Union["NDArray[np.integer[Any]]", Sequence[Sequence[int]]]
 Picture = NDArray[np.uint8]
