@@ -8,6 +8,7 @@ mod export;
 mod look;
 mod play;
 mod rig;
+mod scene;
 mod take;
 mod template;
 mod tools;
@@ -22,6 +23,7 @@ pub(crate) use export::{ConvertArgs, ExportArgs, LayoutArgs, Target};
 pub(crate) use look::{InfoArgs, RenderArgs, Zoom};
 pub(crate) use play::PlayArgs;
 pub(crate) use rig::{CheckArgs, EditCommand, Order, RigArgs, Seam, Unit};
+pub(crate) use scene::{SceneCheckArgs, SceneCommand};
 pub(crate) use take::{RetargetArgs, TakeArgs};
 pub(crate) use template::{TemplateBuildArgs, TemplateCommand};
 pub(crate) use tools::{CompletionsArgs, DoctorArgs};
@@ -50,6 +52,9 @@ pub(crate) enum Command {
     /// Drive a rig by a take and record it
     #[command(after_help = examples::ANIMATE)]
     Animate(AnimateArgs),
+    /// Look at scene files: what is wrong with one, what it would model, what keys there are
+    #[command(subcommand, after_help = examples::SCENE)]
+    Scene(SceneCommand),
     /// Rig and animate the bundled face with the bundled take
     #[command(after_help = examples::DEMO)]
     Demo(DemoArgs),

@@ -44,6 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         surface(name, color, (grid * grid) as usize, &patch_triangles)
     });
     let info = RecordingInfo {
+        face: String::new(),
         rig: "synthetic ball".to_owned(),
         template: "none".to_owned(),
         fps: FPS,

@@ -31,6 +31,7 @@ fn surface(name: &str, color: [u8; 4]) -> SurfaceInfo {
 
 fn info() -> RecordingInfo {
     RecordingInfo {
+        face: String::new(),
         rig: "sheet".to_owned(),
         template: "none 1".to_owned(),
         fps: 60.0,

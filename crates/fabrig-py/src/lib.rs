@@ -63,6 +63,7 @@ fn _fabrig(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(motion::parse_motion, m)?)?;
     m.add_function(wrap_pyfunction!(motion::read_motion, m)?)?;
     m.add_function(wrap_pyfunction!(pipeline::animate, m)?)?;
+    m.add_function(wrap_pyfunction!(pipeline::animate_scene, m)?)?;
     m.add_function(wrap_pyfunction!(pipeline::rig, m)?)?;
     m.add_function(wrap_pyfunction!(registration::register_face, m)?)?;
     m.add_function(wrap_pyfunction!(render::write_gif, m)?)?;

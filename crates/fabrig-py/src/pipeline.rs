@@ -8,8 +8,10 @@ use fabrig_core::anatomy::Resolution;
 use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
+use fabrig_core::motion::ReadOptions;
 use fabrig_core::pipeline::{
-    AnimateOptions, ExpressionScan, OwnShapes, RigFaceOptions, read_own_shapes, rig_face,
+    AnimateOptions, ExpressionScan, OwnShapes, RigFaceOptions, load_faces, read_own_shapes,
+    rig_face,
 };
 use fabrig_core::recording::RecordedKind;
 use fabrig_core::rig::Expression;
@@ -260,7 +262,7 @@ fn shape_weights(name: &str, template: &Template) -> PyResult<Vec<f32>> {
 /// - `rig`, `clip`: what is simulated; `output`: the file
 /// - `scene`: a mapping of the fields of a scene file, or its path; the other arguments go
 ///   before it
-/// - `fps`: frames a second; the take's own by default
+/// - `fps`: frames a second; the scene's or else the take's own by default
 /// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
 /// - `substeps`: of the cloth, per 1/60 s
 /// - `dynamics`: False leaves patches where the muscle shapes want them
@@ -309,30 +311,27 @@ pub(crate) fn animate<'py>(
     }
     let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
     let mut options = AnimateOptions {
-        fps,
+        fps: fps.or(scene.fps),
         ..AnimateOptions::default()
     };
     options.rig_name = rig_name.unwrap_or(options.rig_name);
     options.take_name = take_name.unwrap_or(options.take_name);
-    let recording = &mut options.recording;
+    let mut choice = scene.recording.clone();
     for (name, rate, value) in [
-        ("skin_hz", skin_hz, &mut recording.skin_hz),
-        ("patches_hz", patches_hz, &mut recording.patches_hz),
-        ("points_hz", points_hz, &mut recording.points_hz),
-        ("strain_hz", strain_hz, &mut recording.strain_hz),
+        ("skin_hz", skin_hz, &mut choice.skin_hz),
+        ("patches_hz", patches_hz, &mut choice.patches_hz),
+        ("points_hz", points_hz, &mut choice.points_hz),
+        ("strain_hz", strain_hz, &mut choice.strain_hz),
     ] {
-        *value = rate.unwrap_or(*value);
-        if !(value.is_finite() && *value >= 0.0) {
-            return Err(input(format!(
-                "{name}: {value} is not a rate of at least 0"
-            )));
+        if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate >= 0.0)) {
+            return Err(input(format!("{name}: {rate} is not a rate of at least 0")));
         }
+        *value = rate.or(*value);
     }
     if let Some(record) = record {
-        let kinds = record.iter().map(|name| one_of("record", name, &RECORDED));
-        let kinds: Vec<RecordedKind> = kinds.collect::<PyResult<_>>()?;
-        options.recording = options.recording.only(&kinds);
+        choice.record = Some(recorded(&record)?);
     }
+    options.recording = choice.options();
     let mut progress = Progress::new(py, progress)?;
     let (rig, clip) = (Arc::clone(&rig.inner), clip.inner.clone());
     let report = py.detach(|| {
@@ -347,4 +346,73 @@ pub(crate) fn animate<'py>(
         write_atomically(&path, |file| file.write_all(text))?;
     }
     arrays::to_python(py, &report)
+}
+
+/// What is to be recorded, by names.
+fn recorded(names: &[String]) -> PyResult<Vec<RecordedKind>> {
+    let kinds = names.iter().map(|name| one_of("record", name, &RECORDED));
+    kinds.collect()
+}
+
+/// Simulates the faces of a scene side by side and records them to one MCAP file; returns for each
+/// its name and a report. With several faces the topics of each begin with its name.
+///
+/// - `scene`: the path of a scene file with `faces`, or a mapping of its fields; `output`: the file
+/// - `fps`: frames a second; the scene's or else the first take's own by default
+/// - `record`: as for `animate`; the scene's by default
+/// - `layout`: where to write the layout for Foxglove and Lichtblick; nowhere by default
+/// - `progress`: True for a bar, or a function of (stage, share)
+///
+/// >>> fabrig.rig(fabrig.demo_face()).save("ann.fabrig")
+/// >>> scene = {"faces": [{"rig": "ann.fabrig"}], "duration": 0.1, "wind": [3000, 0, 0]}
+/// >>> [(name, report["frames"]) for name, report in fabrig.animate_scene(scene, "shot.mcap", fps=20)]
+/// [('ann', 3)]
+#[pyfunction]
+#[pyo3(signature = (scene, output, *, fps=None, record=None, layout=None, progress=None))]
+pub(crate) fn animate_scene<'py>(
+    py: Python<'py>,
+    scene: &Bound<'py, PyAny>,
+    output: PathBuf,
+    fps: Option<f64>,
+    record: Option<Vec<String>>,
+    layout: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    if let Some(fps) = fps
+        && !(fps.is_finite() && fps > 0.0)
+    {
+        return Err(input(format!("fps: {fps} is not a frame rate")));
+    }
+    let scene = self::scene(Some(scene), None, None, None, true)?;
+    if scene.faces.is_empty() {
+        return Err(input(
+            "scene: it has no `faces`; `animate` takes a rig and a clip",
+        ));
+    }
+    let mut choice = scene.recording.clone();
+    if let Some(record) = record {
+        choice.record = Some(recorded(&record)?);
+    }
+    let options = AnimateOptions {
+        fps,
+        recording: choice.options(),
+        ..AnimateOptions::default()
+    };
+    let mut progress = Progress::new(py, progress)?;
+    let report = py.detach(|| {
+        let faces = load_faces(&scene, &ReadOptions::default())?;
+        fabrig_core::pipeline::animate_scene(&scene, faces, &output, &options, &mut |now| {
+            progress.report("simulate", now.frame as f64 / now.frame_count as f64)
+        })
+    });
+    progress.finish()?;
+    let report = report.map_err(to_py)?;
+    if let (Some(path), Some((_, first))) = (layout, report.faces.first()) {
+        let text = first.foxglove_layout.as_bytes();
+        write_atomically(&path, |file| file.write_all(text))?;
+    }
+    let faces = report.faces.iter();
+    faces
+        .map(|(name, report)| Ok((name.clone(), arrays::to_python(py, report)?)))
+        .collect()
 }

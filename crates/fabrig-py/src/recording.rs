@@ -17,6 +17,7 @@ use crate::render::{Shot, draw_frame};
 ///
 /// - `path`: the MCAP file
 /// - `recover`: read a file that was cut short as far as it is whole
+/// - `face`: which face, where it has several; its metadata tells their names as `faces`
 ///
 /// >>> rig, clip = fabrig.rig(fabrig.demo_face()), fabrig.demo_take().between(0, 0.1)
 /// >>> report = fabrig.animate(rig, clip, "out.mcap", fps=30)
@@ -31,14 +32,13 @@ pub(crate) struct PyRecording {
 #[pymethods]
 impl PyRecording {
     #[new]
-    #[pyo3(signature = (path, *, recover=false))]
-    fn new(py: Python<'_>, path: PathBuf, recover: bool) -> PyResult<Self> {
-        let reader = py.detach(|| {
-            if recover {
-                RecordingReader::with_recovery(path)
-            } else {
-                RecordingReader::open(path)
-            }
+    #[pyo3(signature = (path, *, recover=false, face=None))]
+    fn new(py: Python<'_>, path: PathBuf, recover: bool, face: Option<&str>) -> PyResult<Self> {
+        let reader = py.detach(|| match (recover, face) {
+            (true, None) => RecordingReader::with_recovery(path),
+            (true, Some(face)) => RecordingReader::face_with_recovery(path, face),
+            (false, None) => RecordingReader::open(path),
+            (false, Some(face)) => RecordingReader::open_face(path, face),
         });
         let reader = reader.map_err(to_py)?;
         Ok(Self {

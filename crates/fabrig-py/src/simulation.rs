@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
-use fabrig_core::motion::EyeAngles;
+use fabrig_core::motion::{EyeAngles, ReadOptions};
+use fabrig_core::pipeline::{StagedFace, load_faces};
+use fabrig_core::scene::fields::HeadDrive;
 use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation, hold_pose};
 use fabrig_core::template;
 use nalgebra::{Isometry3, Vector3};
@@ -61,16 +63,14 @@ pub(crate) fn scene(
 }
 
 fn scene_file(path: &Path) -> PyResult<Scene> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| SceneFailure::new_err(format!("cannot read {}: {e}", path.display())))?;
-    Scene::from_toml(&text).map_err(|e| {
-        let reason = to_py(e);
-        SceneFailure::new_err(format!("{}: {reason}", path.display()))
+    Scene::load(path).map_err(|e| match e {
+        SceneError::Read { .. } => to_py(e),
+        _ => SceneFailure::new_err(format!("{}: {}", path.display(), to_py(e))),
     })
 }
 
 /// Reads a scene file (TOML) as a dictionary of all its fields, those that it leaves out as by
-/// default.
+/// default. Files that a dictionary names are looked for in the working folder.
 ///
 /// - `path`: the file; without one, the default scene
 ///
@@ -109,7 +109,9 @@ pub(crate) fn demo_scene(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
 ///
 /// - `rig`: what moves; `clip`: the take, at whose first frame it starts; neutral without one
 /// - `scene`: a mapping of the fields of a scene file, such as {"contact": {"pairs": "all"},
-///   "colliders": [...]}, or its path; the other arguments go before it
+///   "colliders": [...]}, or its path; the other arguments go before it. With "faces" in it, it
+///   stands for rig and clip too, and time is the scene's
+/// - `face`: name of one of those faces, where there are several
 /// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
 /// - `substeps`: of the cloth, per 1/60 s
 /// - `dynamics`: False leaves patches where the muscle shapes want them
@@ -128,20 +130,34 @@ pub(crate) struct PySimulation {
 #[pymethods]
 impl PySimulation {
     #[new]
-    #[pyo3(signature = (rig, clip=None, *, scene=None, gravity=None, wind=None, substeps=None,
-                        dynamics=true))]
+    #[pyo3(signature = (rig=None, clip=None, *, scene=None, face=None, gravity=None, wind=None,
+                        substeps=None, dynamics=true))]
     #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
     fn new(
         py: Python<'_>,
-        rig: Py<PyRig>,
+        rig: Option<Py<PyRig>>,
         clip: Option<&PyClip>,
         scene: Option<&Bound<'_, PyAny>>,
+        face: Option<&str>,
         gravity: Option<&Bound<'_, PyAny>>,
         wind: Option<&Bound<'_, PyAny>>,
         substeps: Option<u32>,
         dynamics: bool,
     ) -> PyResult<Self> {
         let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
+        let Some(rig) = rig else {
+            if clip.is_some() {
+                return Err(input(
+                    "clip: needs a rig; a scene's faces have takes of their own",
+                ));
+            }
+            return Self::of_scene(py, &scene, face);
+        };
+        if face.is_some() {
+            return Err(input(
+                "face: is of the scene's own faces, but a rig was given",
+            ));
+        }
         let (shared, clip) = (Arc::clone(&rig.get().inner), clip.map(|c| c.inner.clone()));
         let inner = py
             .detach(|| Simulation::new(shared, scene, clip))
@@ -399,6 +415,38 @@ impl PySimulation {
     }
 }
 
+impl PySimulation {
+    /// One of a scene's own faces, at the scene's start.
+    fn of_scene(py: Python<'_>, scene: &Scene, face: Option<&str>) -> PyResult<Self> {
+        let names: Vec<String> = scene.faces.iter().map(|f| f.display_name()).collect();
+        let known = names.join(", ");
+        let index = match (face, names.len()) {
+            (_, 0) => return Err(input("rig: needed, as the scene has no faces of its own")),
+            (None, 1) => 0,
+            (None, _) => return Err(input(format!("face: the scene has several: {known}"))),
+            (Some(face), _) => names
+                .iter()
+                .position(|name| name == face)
+                .ok_or_else(|| input(format!("face: '{face}' is not one of {known}")))?,
+        };
+        let mut only = scene.clone();
+        only.faces = vec![scene.faces[index].clone()];
+        let (inner, rig) = py
+            .detach(|| -> Result<_, fabrig_core::Error> {
+                let faces = load_faces(&only, &ReadOptions::default())?;
+                let [face] = <[StagedFace; 1]>::try_from(faces)
+                    .map_err(|faces| SceneError::HasFaces { count: faces.len() })?;
+                let rig = Arc::clone(&face.rig);
+                let mut inner = Simulation::new(face.rig, face.scene, face.clip)?;
+                inner.start_at(0.0)?;
+                Ok((inner, rig))
+            })
+            .map_err(to_py)?;
+        let rig = Py::new(py, PyRig { inner: rig })?;
+        Ok(Self { inner, rig })
+    }
+}
+
 /// What of a pose a caller gave.
 struct Given<'a, 'py> {
     weights: Option<&'a Bound<'py, PyAny>>,
@@ -408,7 +456,12 @@ struct Given<'a, 'py> {
 }
 
 /// The pose that is given, reached from the present one in `dt`, or at rest.
-fn pose(simulation: &Simulation, given: Given<'_, '_>, dt: Option<f64>) -> PyResult<FacePose> {
+fn pose(simulation: &mut Simulation, given: Given<'_, '_>, dt: Option<f64>) -> PyResult<FacePose> {
+    let at = simulation.time() + dt.unwrap_or(0.0);
+    let of_scene = match simulation.scene().head_motion {
+        HeadDrive::Keyed(_) => Some(simulation.pose_at(at)),
+        HeadDrive::Take(_) => None,
+    };
     let now = simulation.pose();
     let mut pose = FacePose::neutral(now.weights.len());
     if let Some(weights) = given.weights {
@@ -445,10 +498,14 @@ fn pose(simulation: &Simulation, given: Given<'_, '_>, dt: Option<f64>) -> PyRes
             },
         ]);
     }
-    let still = simulation.scene().wind.cast::<f64>();
-    pose.wind = match given.wind {
-        Some(wind) => Vector3::from(arrays::vector("wind", wind)?).cast(),
-        None => still,
-    };
+    pose.wind = simulation.air(&pose.head, at);
+    if let (Some(keyed), None) = (of_scene, given.head) {
+        pose.head = keyed.head;
+        pose.head_motion = keyed.head_motion;
+        pose.wind = keyed.wind;
+    }
+    if let Some(wind) = given.wind {
+        pose.wind = Vector3::from(arrays::vector("wind", wind)?).cast();
+    }
     Ok(pose)
 }

@@ -136,6 +136,16 @@ def stepping(rig: fabrig.Rig, folder: Path) -> None:
     floating = fabrig.Simulation(rig, scene=folder / "scene.toml", substeps=4)
     assert floating.scene["gravity"] == [0, 0, 0] and floating.judge_contact() is None
     simulation = fabrig.Simulation(rig, scene=scene, gravity=[0, -9810, 0])
+    rig.save(folder / "ann.fabrig")
+    shot = "duration = 0.05\nfps = 40\n[turbulence]\nseed = 3\n[simulate]\nonly = ['frontalis_*']\n"
+    for name, place in [("ann", -100), ("bob", 100)]:
+        shot += f"[[faces]]\nname = '{name}'\nrig = 'ann.fabrig'\nposition = [{place}, 0, 0]\n"
+    (folder / "shot.toml").write_text(shot)
+    bob = fabrig.Simulation(scene=folder / "shot.toml", face="bob")
+    assert bob.scene["place"]["position"] == [100, 0, 0] and bob.head[0, 3] == 100
+    faces = fabrig.animate_scene(folder / "shot.toml", folder / "shot.mcap", record=["skin"])
+    assert [(name, report["frames"]) for name, report in faces] == [("ann", 3), ("bob", 3)]
+    assert len(list(fabrig.Recording(folder / "shot.mcap", face="bob"))) == 2
     turn = np.eye(4)
     turn[:3, 3] = 0, 100, 0
     report = simulation.step(

@@ -50,7 +50,7 @@ def test_bad_scenes_and_colliders_are_refused(rig, pressed):
         simulation.set_collider("stick", center)
     with pytest.raises(fabrig.InputError, match="position"):
         simulation.set_collider("ball", [0.0, np.nan, 0.0])
-    with pytest.raises(fabrig.SceneError, match="ball"):
+    with pytest.raises(fabrig.SceneError, match="radius"):
         fabrig.Simulation(rig, scene={"colliders": [ball([0, 0, 200], radius=-1.0)]})
     with pytest.raises(fabrig.SceneError, match="colour"):
         fabrig.Simulation(rig, scene={"colour": "red"})

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use fabrig_core::recording::{RecordedKind, RecordingOptions};
+use fabrig_core::scene::RecordingChoice;
 
 use super::TakeArgs;
 
 #[derive(Debug, Args)]
 pub(crate) struct SceneArgs {
-    /// Frames per second of the simulation [default: the take's]
+    /// Frames per second of the simulation [default: the scene's, or else the take's]
     #[arg(long)]
     pub(crate) fps: Option<f64>,
     /// Substeps of the cloth per 1/60 s [default: the solver's]
@@ -96,53 +97,54 @@ impl From<Recorded> for RecordedKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordingArgs {
-    /// Record only these, with commas between [default: skin, patches, points, contacts,
-    /// colliders, weights, energies, errors]
+    /// Record only these, with commas between [default: the scene's, or else skin, patches, points,
+    /// contacts, colliders, weights, energies, errors]
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub(crate) record: Vec<Recorded>,
-    /// Skin meshes per second in the recording, 0 for none
-    #[arg(long, default_value_t = RecordingOptions::default().skin_hz, value_parser = parse_rate)]
-    pub(crate) skin_hz: f64,
-    /// Patch meshes per second in the recording, 0 for none
-    #[arg(long, default_value_t = RecordingOptions::default().patches_hz, value_parser = parse_rate)]
-    pub(crate) patches_hz: f64,
-    /// Point clouds per second in the recording, 0 for none
-    #[arg(long, default_value_t = RecordingOptions::default().points_hz, value_parser = parse_rate)]
-    pub(crate) points_hz: f64,
-    /// Patch meshes coloured by their stretch per second in the recording, 0 for none
-    #[arg(long, default_value_t = RecordingOptions::default().strain_hz, value_parser = parse_rate)]
-    pub(crate) strain_hz: f64,
+    /// Skin meshes per second in the recording, 0 for none [default: the scene's, or else 30]
+    #[arg(long, value_parser = parse_rate)]
+    pub(crate) skin_hz: Option<f64>,
+    /// Patch meshes per second in the recording, 0 for none [default: the scene's, or else 30]
+    #[arg(long, value_parser = parse_rate)]
+    pub(crate) patches_hz: Option<f64>,
+    /// Point clouds per second in the recording, 0 for none [default: the scene's, or else 10]
+    #[arg(long, value_parser = parse_rate)]
+    pub(crate) points_hz: Option<f64>,
+    /// Patch meshes coloured by their stretch per second in the recording, 0 for none [default: the
+    /// scene's, or else 0]
+    #[arg(long, value_parser = parse_rate)]
+    pub(crate) strain_hz: Option<f64>,
     /// Print the report as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 impl RecordingArgs {
-    /// What is written how often.
-    pub(crate) fn options(&self) -> RecordingOptions {
-        let options = RecordingOptions {
-            skin_hz: self.skin_hz,
-            patches_hz: self.patches_hz,
-            points_hz: self.points_hz,
-            strain_hz: self.strain_hz,
-            ..RecordingOptions::default()
-        };
-        if self.record.is_empty() {
-            return options;
-        }
+    /// What is written how often: as the arguments say, or else the scene.
+    pub(crate) fn options(&self, of_scene: &RecordingChoice) -> RecordingOptions {
         let kinds: Vec<RecordedKind> = self.record.iter().map(|&what| what.into()).collect();
-        options.only(&kinds)
+        let choice = RecordingChoice {
+            record: Some(kinds)
+                .filter(|kinds| !kinds.is_empty())
+                .or_else(|| of_scene.record.clone()),
+            skin_hz: self.skin_hz.or(of_scene.skin_hz),
+            patches_hz: self.patches_hz.or(of_scene.patches_hz),
+            points_hz: self.points_hz.or(of_scene.points_hz),
+            strain_hz: self.strain_hz.or(of_scene.strain_hz),
+        };
+        choice.options()
     }
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct AnimateArgs {
-    /// Rig, as `fabrig rig` makes it
-    pub(crate) rig: PathBuf,
+    /// Rig, as `fabrig rig` makes it; a scene with one face may have its own
+    #[arg(required_unless_present = "file")]
+    pub(crate) rig: Option<PathBuf>,
     /// Live Link Face, ARKit, OpenFace, py-feat or MediaPipe CSV, MediaPipe JSON, Face Cap text
-    /// or keyed text
-    #[arg(long, value_name = "TAKE")]
-    pub(crate) motion: PathBuf,
+    /// or keyed text; a scene with faces may have its own
+    #[arg(long, value_name = "TAKE", required_unless_present = "file")]
+    pub(crate) motion: Option<PathBuf>,
     /// Where to write the recording
     #[arg(short, long, value_name = "OUT.mcap")]
     pub(crate) output: PathBuf,

@@ -21,7 +21,13 @@ pub(super) const ANIMATE: &str = "\
 Examples:
   fabrig animate face.fabrig --motion take.csv -o out.mcap
   fabrig animate face.fabrig --motion take.csv -o out.mcap --contact sphincter --sticky-lips
-  fabrig animate face.fabrig --motion take.csv -o small.mcap --record skin,weights";
+  fabrig animate face.fabrig --motion take.csv -o small.mcap --record skin,weights
+  fabrig animate --scene shot.toml -o shot.mcap";
+
+pub(super) const SCENE: &str = "\
+Examples:
+  fabrig scene show > shot.toml
+  fabrig scene check shot.toml";
 
 pub(super) const DEMO: &str = "\
 Examples:

@@ -3,15 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail, ensure};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::edit::{edits_path, load_edited_rig};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{
-    AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate,
+    AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate, animate_scene,
+    load_faces,
 };
 use fabrig_core::rig::Rig;
-use fabrig_core::scene::{Dynamics, Scene};
+use fabrig_core::scene::{Dynamics, Scene, SceneError};
 
 use super::viewers::{print_how_to_open, write_viewer_files};
 use super::{Outcome, check_output, stem};
@@ -20,15 +21,24 @@ use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
     check_output(&args.output)?;
-    let rig = load_rig(&args.rig)?;
-    let clip = read_take(&args.motion, &args.take)?;
-    let options = AnimateOptions {
-        fps: args.scene.fps,
-        rig_name: stem(&args.rig),
-        take_name: stem(&args.motion),
-        recording: args.recording.options(),
-    };
     let scene = scene(&args.scene)?;
+    if !scene.faces.is_empty() {
+        return run_faces(console, args, scene);
+    }
+    let (Some(rig_path), Some(motion)) = (&args.rig, &args.motion) else {
+        bail!(
+            "the scene has no `faces`: give a rig and --motion, or add [[faces]] to it (`fabrig scene \
+             show`)"
+        );
+    };
+    let rig = load_rig(rig_path)?;
+    let clip = read_take(motion, &args.take)?;
+    let options = AnimateOptions {
+        fps: args.scene.fps.or(scene.fps),
+        rig_name: stem(rig_path),
+        take_name: stem(motion),
+        recording: args.recording.options(&scene.recording),
+    };
     let report = record(console, rig, clip, scene, &args.output, &options)?;
     if args.recording.json {
         console.result(&serde_json::to_string_pretty(&report)?);
@@ -37,6 +47,72 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
         print_how_to_open(console, &args.output);
     }
     Ok(outcome(console, &report))
+}
+
+/// A scene that has its own faces; a rig and a take that are given go before those of a face
+/// that is alone.
+fn run_faces(console: &Console, args: &AnimateArgs, mut scene: Scene) -> Result<Outcome> {
+    let count = scene.faces.len();
+    let is_given = args.rig.is_some() || args.motion.is_some();
+    ensure!(
+        count == 1 || !is_given,
+        "the scene has {count} faces: a rig or --motion of the command line could be any's"
+    );
+    ensure!(
+        args.take.resample.is_none(),
+        "--resample is for takes of the command line alone; a scene's `fps` says how often it is \
+         simulated"
+    );
+    let face = &mut scene.faces[0];
+    if let Some(rig) = &args.rig {
+        face.rig = std::path::absolute(rig)?;
+        face.edits = None;
+    }
+    if let Some(motion) = &args.motion {
+        face.motion = Some(std::path::absolute(motion)?);
+    }
+    let faces =
+        load_faces(&scene, &read_options(&args.take)).with_context(|| in_scene(&args.scene))?;
+    let options = AnimateOptions {
+        fps: args.scene.fps,
+        recording: args.recording.options(&scene.recording),
+        ..AnimateOptions::default()
+    };
+    let report = animate_scene(&scene, faces, &args.output, &options, &mut |now| {
+        let detail = format!("{}/{} frames", now.frame, now.frame_count);
+        console.show("simulate", now.frame, now.frame_count, &detail)
+    });
+    console.clear();
+    let report = report.with_context(|| in_scene(&args.scene))?;
+    let [(_, first), ..] = &report.faces[..] else {
+        bail!("nothing was simulated");
+    };
+    write_viewer_files(&args.output, &first.foxglove_layout)?;
+    if args.recording.json {
+        console.result(&if count == 1 {
+            serde_json::to_string_pretty(first)?
+        } else {
+            serde_json::to_string_pretty(&report)?
+        });
+        return Ok(outcome(console, first));
+    }
+    for (name, report) in &report.faces {
+        if count > 1 {
+            console.result(&format!("{:<20}{name}", "face"));
+            print_face(console, report);
+        }
+    }
+    if count == 1 {
+        print_face(console, first);
+    }
+    print_recording(console, first);
+    print_how_to_open(console, &args.output);
+    Ok(outcome(console, first))
+}
+
+fn in_scene(args: &SceneArgs) -> String {
+    let path = args.file.as_deref().unwrap_or(Path::new("the scene"));
+    format!("in {}", path.display())
 }
 
 /// Loads a rig with the edits that stand beside it.
@@ -55,7 +131,7 @@ pub(super) fn load_unedited_rig(path: &Path) -> Result<Rig> {
     Rig::load(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 
-fn read_options(args: &TakeArgs) -> ReadOptions {
+pub(super) fn read_options(args: &TakeArgs) -> ReadOptions {
     ReadOptions {
         format: args.motion_format.map(Into::into),
         frame_rate: args.motion_fps,
@@ -100,14 +176,18 @@ pub(super) fn record(
     Ok(report)
 }
 
+/// Reads a scene file.
+pub(super) fn load_scene(path: &Path) -> Result<Scene> {
+    Scene::load(path).map_err(|error| match error {
+        SceneError::Read { .. } => anyhow::Error::from(error),
+        _ => anyhow::Error::from(error).context(format!("in {}", path.display())),
+    })
+}
+
 /// The scene that the arguments describe.
 pub(super) fn scene(args: &SceneArgs) -> Result<Scene> {
     let mut scene = match &args.file {
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("cannot read {}", path.display()))?;
-            Scene::from_toml(&text).with_context(|| format!("in {}", path.display()))?
-        }
+        Some(path) => load_scene(path)?,
         None => Scene::default(),
     };
     if let Some(pairs) = args.contact {
@@ -157,6 +237,12 @@ pub(super) fn outcome(console: &Console, report: &AnimateReport) -> Outcome {
 
 /// What the animation took and did, for people.
 pub(super) fn print_report(console: &Console, report: &AnimateReport) {
+    print_face(console, report);
+    print_recording(console, report);
+}
+
+/// What of a report is of one face.
+fn print_face(console: &Console, report: &AnimateReport) {
     let line = |name: &str, value: String| console.result(&format!("{name:<20}{value}"));
     let times = |t: &TimeStatistics| {
         format!(
@@ -197,6 +283,11 @@ pub(super) fn print_report(console: &Console, report: &AnimateReport) {
     if let Some(contact) = &report.contact {
         print_contact(&line, contact);
     }
+}
+
+/// What of a report is of the recording, whose faces share it.
+fn print_recording(console: &Console, report: &AnimateReport) {
+    let line = |name: &str, value: String| console.result(&format!("{name:<20}{value}"));
     for topic in &report.recording.topics {
         line(
             "topic",

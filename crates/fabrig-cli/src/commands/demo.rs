@@ -40,15 +40,15 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
         rig::print_report(console, &rigged);
         console.result("");
     }
+    let scene = played_scene(args)?;
     let options = AnimateOptions {
-        fps: args.scene.fps,
+        fps: args.scene.fps.or(scene.fps),
         rig_name: "demo".to_owned(),
         take_name: name.to_owned(),
-        recording: args.recording.options(),
+        recording: args.recording.options(&scene.recording),
     };
     let registration = rigged.report;
     let (positions, hinge) = (rigged.rig.positions.clone(), rigged.rig.jaw.hinge);
-    let scene = played_scene(args)?;
     let report = record(console, rigged.rig, clip, scene, &args.output, &options)?;
     if args.recording.json {
         let both = json!({ "rig": registration, "animation": report });

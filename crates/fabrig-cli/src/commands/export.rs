@@ -18,6 +18,7 @@ use crate::console::Console;
 pub(crate) fn run(console: &Console, args: &ExportArgs) -> Result<Outcome> {
     check_target(&args.output)?;
     let rig = Arc::new(load_rig(&args.rig)?);
+    let scene = scene(&args.scene)?;
     let mut options = ExportOptions {
         shapes: if args.scene.without_dynamics {
             ShapeSource::Targets
@@ -25,9 +26,9 @@ pub(crate) fn run(console: &Console, args: &ExportArgs) -> Result<Outcome> {
             ShapeSource::Settled
         },
         baked: args.baked,
-        fps: args.scene.fps,
+        fps: args.scene.fps.or(scene.fps),
         check_sum: !args.skip_check,
-        scene: scene(&args.scene)?,
+        scene,
         ..layout(&args.layout, &args.rig)
     };
     if let Some(path) = &args.motion {

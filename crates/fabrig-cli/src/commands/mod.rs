@@ -20,6 +20,7 @@ mod render;
 mod report;
 mod retarget;
 mod rig;
+mod scene;
 mod self_description;
 mod subjects;
 mod template;
@@ -48,6 +49,7 @@ pub(crate) fn run(console: &Console, command: Command) -> Result<Outcome> {
     match command {
         Command::Rig(args) => rig::run(console, &args),
         Command::Animate(args) => animate::run(console, &args),
+        Command::Scene(command) => scene::run(console, &command),
         Command::Demo(args) => demo::run(console, &args),
         Command::Check(args) => check::run(console, &args),
         Command::Export(args) => export::run(console, &args),

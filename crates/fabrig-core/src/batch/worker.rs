@@ -25,7 +25,7 @@ use crate::motion::{self, Clip};
 use crate::pipeline::{AnimateOptions, RigFaceOptions, animate, read_own_shapes, rig_face};
 use crate::registration::{RegistrationError, read_landmarks};
 use crate::rig::Rig;
-use crate::scene::{Dynamics, Scene};
+use crate::scene::{Dynamics, Scene, SceneError};
 use crate::template::{Template, human};
 
 /// Why a job has no result.
@@ -398,8 +398,11 @@ pub(super) fn read_scene(entry: &SceneEntry) -> Result<Scene, Failure> {
             failure.message = format!("{}: {}", entry.file.display(), failure.message);
             failure
         };
-        let text = std::fs::read_to_string(&entry.file).map_err(|e| fail(&e))?;
-        scene = Scene::from_toml(&text).map_err(|e| fail(&e))?;
+        scene = Scene::load(&entry.file).map_err(|e| fail(&e))?;
+        if !scene.faces.is_empty() {
+            let count = scene.faces.len();
+            return Err(fail(&SceneError::HasFaces { count }));
+        }
     }
     if let Some(substeps) = entry.substeps {
         scene.cloth.substeps = substeps;

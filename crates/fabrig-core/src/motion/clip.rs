@@ -65,6 +65,14 @@ pub enum ClipError {
         /// The rate. (1/s)
         found: f64,
     },
+    /// A speed at which no take can be played.
+    #[error("a take that starts at {start} s cannot be played {speed} times as fast")]
+    Speed {
+        /// Where it was to start. (s)
+        start: f64,
+        /// How fast.
+        speed: f64,
+    },
     /// A head, eye or wind value is not finite.
     #[error("frame {frame} has a {what} value that is not finite")]
     NotFinite {
@@ -361,6 +369,24 @@ impl Clip {
         let inner = inner.filter(|time| first < *time && *time < last);
         let times = std::iter::once(first).chain(inner).chain([last]);
         Ok(self.sampled_at(times.collect()))
+    }
+
+    /// The clip with its first frame at `start` (s), played `speed` times as fast; the take's own
+    /// wind stays what it is.
+    ///
+    /// # Errors
+    ///
+    /// [`ClipError::Speed`] where `speed` is not a positive number or `start` not finite.
+    pub fn retimed(&self, start: f64, speed: f64) -> Result<Self, ClipError> {
+        if !(speed.is_finite() && speed > 0.0 && start.is_finite()) {
+            return Err(ClipError::Speed { start, speed });
+        }
+        let first = self.times[0];
+        let times = self.times.iter().map(|time| start + (time - first) / speed);
+        Ok(Self {
+            times: times.collect(),
+            ..self.clone()
+        })
     }
 
     /// The clip's values at other times (rising).

@@ -123,50 +123,73 @@ pub fn animate(
     let fps = options.fps.unwrap_or_else(|| recording_rate(&clip));
     let maker = FrameMaker::new(&rig, options.recording);
     let info = maker.info(&rig, Some(&clip), &scene, fps, options)?;
-    let foxglove_layout = foxglove_layout(&info, &options.recording);
+    let foxglove_layout = foxglove_layout(&[&info], &options.recording);
     // Opened first: it refuses a bad frame rate or folder before anything is computed.
     let mut recorder = McapRecorder::create(output, info, options.recording)?;
     let take = clip.notes().clone();
     let frame_count = (clip.duration() * fps + 1e-6).floor() as u64 + 1;
-    let vertex_count = rig.face.vertex_count();
-    let node_count = rig.patches.iter().map(|p| p.patch.neutral.len()).sum();
     let run = Simulation::new(rig, scene, Some(clip))
         .map_err(Error::from)
         .and_then(|simulation| {
-            let run = Run {
-                simulation,
-                maker,
-                fps,
-                frame_count,
-                measures: Measures::default(),
-            };
-            run.record_all(&mut recorder, progress)
+            let mut runs = [Run::new(simulation, maker)];
+            record_all(&mut runs, &mut recorder, fps, frame_count, progress)?;
+            Ok(runs)
         });
-    let measures = match run {
-        Ok(measures) => measures,
+    let [run] = match run {
+        Ok(runs) => runs,
         Err(error) => {
             recorder.discard();
             return Err(error);
         }
     };
     let recording = recorder.finish()?;
-    Ok(AnimateReport {
-        is_complete: recording.frames == frame_count,
-        frames: recording.frames,
+    let whole = Whole {
         fps,
-        vertex_count,
-        node_count,
-        simulation_ms: TimeStatistics::of(measures.simulation_ms),
-        cloth_ms: TimeStatistics::of(measures.cloth_ms),
-        recording_ms: TimeStatistics::of(measures.recording_ms),
+        frame_count,
         wall_secs: wall.elapsed().as_secs_f64(),
-        guards: measures.guards,
-        settle_rms_max: measures.settle_rms_max,
-        contact: measures.contact,
-        take,
         recording,
         foxglove_layout,
-    })
+    };
+    Ok(run.report(take, &whole))
+}
+
+/// What faces that were recorded together share.
+pub(super) struct Whole {
+    pub(super) fps: f64,
+    pub(super) frame_count: u64,
+    pub(super) wall_secs: f64,
+    pub(super) recording: RecordingReport,
+    pub(super) foxglove_layout: String,
+}
+
+/// Steps faces side by side and records every frame of each.
+pub(super) fn record_all(
+    runs: &mut [Run],
+    recorder: &mut McapRecorder,
+    fps: f64,
+    frame_count: u64,
+    progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
+) -> Result<(), Error> {
+    for (face, run) in runs.iter_mut().enumerate() {
+        run.maker.watch(&run.simulation);
+        run.record(recorder, face, &FrameReport::default())?;
+    }
+    for frame in 1..frame_count {
+        let mut last = FrameReport::default();
+        for (face, run) in runs.iter_mut().enumerate() {
+            last = run.advance(1.0 / fps)?;
+            run.record(recorder, face, &last)?;
+        }
+        let now = AnimateProgress {
+            frame: frame + 1,
+            frame_count,
+            last,
+        };
+        if progress(now).is_break() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// What is measured on the way.
@@ -177,53 +200,69 @@ struct Measures {
     recording_ms: Vec<f64>,
     guards: Counters,
     settle_rms_max: f64,
-    contact: Option<ContactSummary>,
 }
 
 /// A simulation on its way into a recording.
-struct Run {
+pub(super) struct Run {
     simulation: Simulation,
     maker: FrameMaker,
-    fps: f64,
-    frame_count: u64,
     measures: Measures,
 }
 
 impl Run {
-    fn record_all(
-        mut self,
-        recorder: &mut McapRecorder,
-        progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
-    ) -> Result<Measures, Error> {
-        self.maker.watch(&self.simulation);
-        self.record(recorder, &FrameReport::default())?;
-        for frame in 1..self.frame_count {
-            let clock = Instant::now();
-            let report = self.simulation.advance(1.0 / self.fps)?;
-            self.measures.simulation_ms.push(milliseconds(clock));
-            self.measures.cloth_ms.push(report.cloth_ms);
-            self.measures.guards += report.step.counters;
-            self.measures.settle_rms_max = self.measures.settle_rms_max.max(report.settle_rms);
-            self.record(recorder, &report)?;
-            let now = AnimateProgress {
-                frame: frame + 1,
-                frame_count: self.frame_count,
-                last: report,
-            };
-            if progress(now).is_break() {
-                break;
-            }
+    pub(super) fn new(simulation: Simulation, maker: FrameMaker) -> Self {
+        Self {
+            simulation,
+            maker,
+            measures: Measures::default(),
         }
-        self.measures.contact = self.maker.contact_summary();
-        Ok(self.measures)
     }
 
-    fn record(&mut self, recorder: &mut McapRecorder, report: &FrameReport) -> Result<(), Error> {
+    fn advance(&mut self, dt: f64) -> Result<FrameReport, Error> {
         let clock = Instant::now();
-        self.maker
-            .give(&self.simulation, report, |frame| recorder.record(frame))?;
+        let report = self.simulation.advance(dt)?;
+        self.measures.simulation_ms.push(milliseconds(clock));
+        self.measures.cloth_ms.push(report.cloth_ms);
+        self.measures.guards += report.step.counters;
+        self.measures.settle_rms_max = self.measures.settle_rms_max.max(report.settle_rms);
+        Ok(report)
+    }
+
+    fn record(
+        &mut self,
+        recorder: &mut McapRecorder,
+        face: usize,
+        report: &FrameReport,
+    ) -> Result<(), Error> {
+        let clock = Instant::now();
+        self.maker.give(&self.simulation, report, |frame| {
+            recorder.record_face(face, frame)
+        })?;
         self.measures.recording_ms.push(milliseconds(clock));
         Ok(())
+    }
+
+    /// - `take`: what reading the take had to decide
+    pub(super) fn report(mut self, take: ClipNotes, whole: &Whole) -> AnimateReport {
+        let rig = self.simulation.rig();
+        let measures = self.measures;
+        AnimateReport {
+            is_complete: whole.recording.frames == whole.frame_count,
+            frames: whole.recording.frames,
+            fps: whole.fps,
+            vertex_count: rig.face.vertex_count(),
+            node_count: rig.patches.iter().map(|p| p.patch.neutral.len()).sum(),
+            simulation_ms: TimeStatistics::of(measures.simulation_ms),
+            cloth_ms: TimeStatistics::of(measures.cloth_ms),
+            recording_ms: TimeStatistics::of(measures.recording_ms),
+            wall_secs: whole.wall_secs,
+            guards: measures.guards,
+            settle_rms_max: measures.settle_rms_max,
+            contact: self.maker.contact_summary(),
+            take,
+            recording: whole.recording.clone(),
+            foxglove_layout: whole.foxglove_layout.clone(),
+        }
     }
 }
 

@@ -90,6 +90,7 @@ impl FrameMaker {
             .iter()
             .filter(|(_, is_asked, _)| is_asked(&self.options));
         let mut info = RecordingInfo {
+            face: String::new(),
             rig: options.rig_name.clone(),
             template: rig.template.clone(),
             fps,

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::motion::Clip;
 use crate::recording::{FrameEncoder, MessageSink, TopicInfo};
 use crate::rig::Rig;
-use crate::scene::{FacePose, FrameReport, Scene, SceneError, Simulation};
+use crate::scene::{FrameReport, Scene, SceneError, Simulation};
 use crate::transfer::TransferError;
 
 /// Frames a second without a take that has a rate of its own. (1/s)
@@ -127,10 +127,11 @@ impl LiveFace {
         if let Some((start, _)) = restart {
             self.time = start;
         }
-        let mut pose = match self.span {
-            Some(_) => self.simulation.pose_at(self.time),
-            None => FacePose::neutral(self.set.len()),
-        };
+        let mut pose = self.simulation.pose_at(self.time);
+        if self.span.is_none() {
+            pose.weights.fill(0.0);
+            pose.rates.fill(0.0);
+        }
         for (shape, set) in self.set.iter().enumerate() {
             if let Some(weight) = set {
                 let before = self.simulation.pose().weights[shape];

@@ -29,6 +29,7 @@ mod own_shapes;
 mod own_template;
 mod rig_face;
 mod runtime;
+mod stage;
 mod strain;
 mod surfaces;
 mod timing;
@@ -42,4 +43,7 @@ pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shap
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use runtime::{FaceRow, RuntimeProgress, RuntimeReport, SizeRow, runtime};
+pub use stage::{
+    StageReport, StagedFace, animate_scene, edits_of, load_faces, scene_duration, scene_rate,
+};
 pub use timing::TimeStatistics;

@@ -1,9 +1,12 @@
 //! What a recording is to hold, by name.
 
+use serde::{Deserialize, Serialize};
+
 use super::RecordingOptions;
 
 /// Something that a recording can hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum RecordedKind {
     /// Skin, eyeballs, teeth and tongue as shaded meshes.
     Skin,

@@ -5,7 +5,7 @@ use prost::Message;
 use prost_types::Duration;
 
 use super::SurfaceInfo;
-use super::encode::{HEAD_FRAME, SurfaceEncoder, rounded};
+use super::encode::{SurfaceEncoder, rounded};
 use super::messages::{self as wire, timestamp};
 
 /// Contact at one instant, borrowed from whoever computed it.
@@ -42,12 +42,16 @@ const COLORS: [[u8; 3]; 2] = [[70, 190, 255], [255, 170, 40]];
 /// Encodes what a scene with contact shows.
 pub(super) struct ContactEncoder {
     colliders: SurfaceEncoder,
+    /// Frame that everything stands in.
+    frame: String,
 }
 
 impl ContactEncoder {
-    pub(super) fn new(colliders: &[SurfaceInfo]) -> Self {
+    /// - `frame`: that everything stands in
+    pub(super) fn new(colliders: &[SurfaceInfo], frame: &str) -> Self {
         Self {
-            colliders: SurfaceEncoder::new(colliders),
+            colliders: SurfaceEncoder::new(colliders, frame),
+            frame: frame.to_owned(),
         }
     }
 
@@ -57,7 +61,7 @@ impl ContactEncoder {
     }
 
     /// Arrows as a scene update of one entity, which replaces the one before.
-    pub(super) fn arrows(nanos: u64, frame: &ContactFrame<'_>) -> Vec<u8> {
+    pub(super) fn arrows(&self, nanos: u64, frame: &ContactFrame<'_>) -> Vec<u8> {
         let mut list = wire::TriangleList {
             pose: Some(super::encode::identity_pose()),
             ..wire::TriangleList::default()
@@ -67,7 +71,7 @@ impl ContactEncoder {
         }
         let entity = wire::SceneEntity {
             timestamp: Some(timestamp(nanos)),
-            frame_id: HEAD_FRAME.to_owned(),
+            frame_id: self.frame.clone(),
             id: ARROWS.to_owned(),
             lifetime: Some(Duration::default()),
             frame_locked: true,

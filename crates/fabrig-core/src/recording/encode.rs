@@ -7,10 +7,33 @@ use prost::encoding::{WireType, encode_key, encode_varint, encoded_len_varint, k
 use super::frame::{NORMAL_STEP, POSITION_STEP, SurfaceInfo, UNITS_PER_MM};
 use super::messages::{self as wire, timestamp};
 
-/// Frame of all geometry.
-pub(super) const HEAD_FRAME: &str = "head";
-const RIG_FRAME: &str = "rig";
+/// What the frames of a face are called: those of faces in one recording begin with their names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FrameNames {
+    /// Of all geometry.
+    pub(super) head: String,
+    /// With +Y up, in which the head moves.
+    pub(super) rig: String,
+}
+
 const WORLD_FRAME: &str = "world";
+
+impl FrameNames {
+    /// - `face`: its name; empty where it is alone
+    pub(super) fn of(face: &str) -> Self {
+        let name = |frame: &str| {
+            if face.is_empty() {
+                frame.to_owned()
+            } else {
+                format!("{face}/{frame}")
+            }
+        };
+        Self {
+            head: name("head"),
+            rig: name("rig"),
+        }
+    }
+}
 
 /// A coordinate in message units, rounded.
 pub(super) fn rounded(mm: f32) -> f64 {
@@ -30,27 +53,35 @@ struct EncodedSurface {
 /// Surfaces that share a topic.
 pub(super) struct SurfaceEncoder {
     surfaces: Vec<EncodedSurface>,
+    /// Frame that they stand in.
+    frame: String,
 }
 
 impl SurfaceEncoder {
-    pub(super) fn new(surfaces: &[SurfaceInfo]) -> Self {
-        Self::encoded(surfaces, EncodedSurface::new)
+    /// - `frame`: that they stand in
+    pub(super) fn new(surfaces: &[SurfaceInfo], frame: &str) -> Self {
+        Self::encoded(surfaces, frame, EncodedSurface::new)
     }
 
     /// For [`Self::colored_scene`].
-    pub(super) fn colored_later(surfaces: &[SurfaceInfo]) -> Self {
-        Self::encoded(surfaces, EncodedSurface::colored_later)
+    pub(super) fn colored_later(surfaces: &[SurfaceInfo], frame: &str) -> Self {
+        Self::encoded(surfaces, frame, EncodedSurface::colored_later)
     }
 
-    fn encoded(surfaces: &[SurfaceInfo], encode: fn(&SurfaceInfo, u32) -> EncodedSurface) -> Self {
+    fn encoded(
+        surfaces: &[SurfaceInfo],
+        frame: &str,
+        encode: fn(&SurfaceInfo, u32, &str) -> EncodedSurface,
+    ) -> Self {
         let mut first = 0;
         let surfaces = surfaces.iter().map(|surface| {
-            let encoded = encode(surface, first);
+            let encoded = encode(surface, first, frame);
             first += surface.vertex_count as u32;
             encoded
         });
         Self {
             surfaces: surfaces.collect(),
+            frame: frame.to_owned(),
         }
     }
 
@@ -127,7 +158,7 @@ impl SurfaceEncoder {
         });
         wire::PointCloud {
             timestamp: Some(timestamp(nanos)),
-            frame_id: HEAD_FRAME.to_owned(),
+            frame_id: self.frame.clone(),
             pose: Some(identity_pose()),
             point_stride: CLOUD_STRIDE as u32,
             fields: fields.collect(),
@@ -145,22 +176,23 @@ const NORMAL_BYTES: usize = 18;
 
 impl EncodedSurface {
     /// `first` counts the vertices of the message before this surface.
-    fn new(info: &SurfaceInfo, first: u32) -> Self {
-        Self::with_colors(info, first, &info.vertex_colors, true)
+    fn new(info: &SurfaceInfo, first: u32, frame: &str) -> Self {
+        Self::with_colors(info, first, frame, Some(&info.vertex_colors))
     }
 
     /// A surface whose vertices get their colours with every frame.
-    fn colored_later(info: &SurfaceInfo, first: u32) -> Self {
-        Self::with_colors(info, first, &[], false)
+    fn colored_later(info: &SurfaceInfo, first: u32, frame: &str) -> Self {
+        Self::with_colors(info, first, frame, None)
     }
 
     fn with_colors(
         info: &SurfaceInfo,
         first: u32,
-        vertex_colors: &[[u8; 4]],
-        has_colors: bool,
+        frame: &str,
+        vertex_colors: Option<&[[u8; 4]]>,
     ) -> Self {
-        let colored = if has_colors { info.vertex_count } else { 0 };
+        let colored = vertex_colors.map_or(0, |_| info.vertex_count);
+        let vertex_colors = vertex_colors.unwrap_or_default();
         let list = wire::TriangleList {
             pose: Some(identity_pose()),
             points: Vec::new(),
@@ -184,7 +216,7 @@ impl EncodedSurface {
         };
         let entity = wire::SceneEntity {
             timestamp: None,
-            frame_id: HEAD_FRAME.to_owned(),
+            frame_id: frame.to_owned(),
             id: info.name.clone(),
             lifetime: Some(prost_types::Duration::default()),
             frame_locked: true,
@@ -273,7 +305,11 @@ fn normals(positions: &[Point3<f32>], triangles: &[[u32; 3]]) -> Vec<Vector3<f32
 }
 
 /// World to rig to head.
-pub(super) fn transforms(nanos: u64, head: &Isometry3<f64>) -> wire::FrameTransforms {
+pub(super) fn transforms(
+    nanos: u64,
+    names: &FrameNames,
+    head: &Isometry3<f64>,
+) -> wire::FrameTransforms {
     // +Y up becomes +Z up, and the face looks along -Y, towards a viewer's default camera.
     let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     let upright = Isometry3::from_parts(Default::default(), upright);
@@ -281,8 +317,8 @@ pub(super) fn transforms(nanos: u64, head: &Isometry3<f64>) -> wire::FrameTransf
     scaled.translation.vector *= UNITS_PER_MM;
     wire::FrameTransforms {
         transforms: vec![
-            transform(nanos, WORLD_FRAME, RIG_FRAME, &upright),
-            transform(nanos, RIG_FRAME, HEAD_FRAME, &scaled),
+            transform(nanos, WORLD_FRAME, &names.rig, &upright),
+            transform(nanos, &names.rig, &names.head, &scaled),
         ],
     }
 }
@@ -348,7 +384,7 @@ mod tests {
 
     #[test]
     fn the_root_turns_up_and_the_face_looks_along_minus_y() {
-        let frames = transforms(0, &Isometry3::identity());
+        let frames = transforms(0, &FrameNames::of(""), &Isometry3::identity());
         let q = frames.transforms[0].rotation.clone().expect("rotation");
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q.w, q.x, q.y, q.z));
         assert!((q * Vector3::y() - Vector3::z()).norm() < 1e-12);
@@ -370,7 +406,7 @@ mod tests {
             Point3::new(10.0, 0.0, 0.0),
             Point3::new(0.0, 10.0, 0.0),
         ];
-        let encoder = SurfaceEncoder::new(&[surface("one"), surface("two")]);
+        let encoder = SurfaceEncoder::new(&[surface("one"), surface("two")], "head");
         let scene = encoder.scene(1_500_000_000, &[&positions, &positions]);
         let scene = wire::SceneUpdate::decode(&scene[..]).expect("sound");
         let entity = &scene.entities[1];

@@ -45,6 +45,24 @@ pub enum RecordingError {
         /// What is missing or wrong.
         reason: String,
     },
+    /// A recording has several faces of which none was chosen.
+    #[error("`{path}` has several faces; choose one of: {faces}")]
+    SeveralFaces {
+        /// The file.
+        path: PathBuf,
+        /// Their names.
+        faces: String,
+    },
+    /// A recording has no face of this name.
+    #[error("`{path}` has no face called '{found}'; it has: {faces}")]
+    NoSuchFace {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for.
+        found: String,
+        /// The faces that it has; `one without a name` where it has one.
+        faces: String,
+    },
     /// A message does not follow its schema.
     #[error("message {sequence} on `{topic}` of `{path}` cannot be decoded")]
     Message {

@@ -61,6 +61,9 @@ pub struct SurfaceInfo {
 /// What a recording is opened with: everything that does not change from frame to frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingInfo {
+    /// Name of the face where a recording has several; empty where it has one. It goes before
+    /// the names of topics and frames.
+    pub face: String,
     /// Name of the rig.
     pub rig: String,
     /// Name and version of its template.
@@ -220,6 +223,14 @@ impl RecordingInfo {
     /// Refuses what no viewer could show.
     pub(super) fn check(&self) -> Result<(), RecordingError> {
         let refuse = |reason: String| Err(RecordingError::Info { reason });
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        if !self.face.chars().all(is_plain) {
+            return refuse(format!(
+                "`{}` cannot be a face's name in a recording: it goes into topics, so it may have \
+                 letters from a to z, digits and any of _ - . alone",
+                self.face
+            ));
+        }
         if !(self.fps.is_finite() && self.fps > 0.0 && self.fps <= 1e6) {
             return refuse(format!("{} frames a second is not a frame rate", self.fps));
         }
@@ -270,6 +281,15 @@ impl RecordingInfo {
             }
         }
         Ok(())
+    }
+
+    /// One of [`topics`] as the recording calls it: with the face's name before it.
+    pub fn topic(&self, topic: &str) -> String {
+        if self.face.is_empty() {
+            topic.to_owned()
+        } else {
+            format!("/{}{topic}", self.face)
+        }
     }
 
     /// Time from frame to frame. Rounded up: viewers warn of a topic when its message count

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use prost::Message;
 
 use super::contact::ContactEncoder;
-use super::encode::{SurfaceEncoder, series, transforms};
+use super::encode::{FrameNames, SurfaceEncoder, series, transforms};
 use super::frame::{NORMAL_STEP, POSITION_STEP, UNITS_PER_MM, field_name, stride, topics};
 use super::layout::plotted_weights;
 use super::messages::{Log, timestamp};
@@ -17,7 +17,8 @@ use super::{
     foxglove_layout,
 };
 
-/// A topic with what its messages are.
+/// A topic with what its messages are. Where a recording has several faces, the name of each
+/// goes before its topics.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TopicInfo {
     /// Its name, one of [`topics`].
@@ -34,12 +35,13 @@ pub struct TopicInfo {
 pub type MessageSink<'a> =
     &'a mut dyn FnMut(&'static str, u64, &[u8]) -> Result<(), RecordingError>;
 
-/// Encodes frames as protobuf messages.
+/// Encodes frames of one face as protobuf messages.
 ///
 /// What does not change from frame to frame is encoded once.
 pub struct FrameEncoder {
     info: RecordingInfo,
     options: RecordingOptions,
+    names: FrameNames,
     skin: SurfaceEncoder,
     patches: SurfaceEncoder,
     strained: SurfaceEncoder,
@@ -54,12 +56,15 @@ impl FrameEncoder {
     /// [`RecordingError::Info`] for an announcement that makes no sense.
     pub fn new(info: RecordingInfo, options: RecordingOptions) -> Result<Self, RecordingError> {
         info.check()?;
+        let names = FrameNames::of(&info.face);
+        let (head, contact) = (&names.head.clone(), info.colliders.as_deref());
         Ok(Self {
-            skin: SurfaceEncoder::new(std::slice::from_ref(&info.skin)),
-            patches: SurfaceEncoder::new(&info.patches),
-            strained: SurfaceEncoder::colored_later(&info.patches),
-            parts: SurfaceEncoder::new(&info.parts),
-            contact: info.colliders.as_deref().map(ContactEncoder::new),
+            skin: SurfaceEncoder::new(std::slice::from_ref(&info.skin), head),
+            patches: SurfaceEncoder::new(&info.patches, head),
+            strained: SurfaceEncoder::colored_later(&info.patches, head),
+            parts: SurfaceEncoder::new(&info.parts, head),
+            contact: contact.map(|colliders| ContactEncoder::new(colliders, head)),
+            names,
             info,
             options,
             frames: 0,
@@ -72,9 +77,14 @@ impl FrameEncoder {
         encoders.map(SurfaceEncoder::frame_bytes).iter().sum()
     }
 
+    /// What it was made with.
+    pub fn info(&self) -> &RecordingInfo {
+        &self.info
+    }
+
     /// The layout for Foxglove and Lichtblick, as JSON.
     pub fn layout(&self) -> String {
-        foxglove_layout(&self.info, &self.options)
+        foxglove_layout(&[&self.info], &self.options)
     }
 
     /// The topics that there will be messages on; those that were not asked for are not there.
@@ -223,7 +233,7 @@ impl FrameEncoder {
         sink(
             topics::TF,
             now,
-            &transforms(now, &frame.head).encode_to_vec(),
+            &transforms(now, &self.names, &frame.head).encode_to_vec(),
         )?;
         if skin_due {
             let scene = self.skin.scene(now, &[frame.skin]);
@@ -238,7 +248,7 @@ impl FrameEncoder {
                 sink(topics::COLLIDERS, now, &encoder.colliders(now, contact))?;
             }
             if self.options.contacts {
-                sink(topics::CONTACTS, now, &ContactEncoder::arrows(now, contact))?;
+                sink(topics::CONTACTS, now, &encoder.arrows(now, contact))?;
             }
         }
         if patches_due && !frame.patches.is_empty() {

@@ -8,6 +8,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::encode::FrameNames;
 use super::frame::{field_name, topics};
 use super::{RecordingInfo, RecordingOptions};
 
@@ -29,8 +30,9 @@ const UNITS: [(&str, &str); 4] = [
 const COUNTS: &str = "Counts";
 
 /// The Foxglove layout of a recording as JSON: skin and patches side by side (and the strain
-/// where it is recorded), a plot of the weights, one of the statistics of each unit, the log.
-pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> String {
+/// where it is recorded), all faces in each; for every face a plot of the weights and one of the
+/// statistics of each unit; the log.
+pub fn foxglove_layout(faces: &[&RecordingInfo], options: &RecordingOptions) -> String {
     let mut panels = Map::new();
     let mut add = |id: String, panel: Value| {
         panels.insert(id.clone(), panel);
@@ -60,32 +62,44 @@ pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> Stri
         if topic == topics::SKIN_POINTS {
             visible.push(topics::PATCH_POINTS);
         }
-        let panel = scene_panel(title, &visible);
+        let panel = scene_panel(title, &visible, faces);
         add(format!("3D!{id}"), panel)
     });
     let scenes: Vec<Value> = scenes.collect();
 
-    let weights = options.weights.then(|| {
+    // With the face's name at its end where there are several.
+    let named = |text: &str, info: &RecordingInfo| match info.face.as_str() {
+        "" => text.to_owned(),
+        face => format!("{text} {face}"),
+    };
+    let weights = faces.iter().filter(|_| options.weights).map(|info| {
         let panel = plot_panel(
-            "Weights",
-            topics::WEIGHTS,
+            &named("Weights", info),
+            &info.topic(topics::WEIGHTS),
             &info.weight_names,
             &plotted_weights(info),
             "left",
         );
-        add("Plot!weights".to_owned(), panel)
+        add(named("Plot!weights", info), panel)
     });
-    let units = UNITS.iter().map(|unit| unit.1).chain([COUNTS]);
+    let weights: Vec<Value> = weights.collect();
     let mut below = Vec::new();
-    for (index, title) in units.enumerate() {
-        let is_in = |name: &&String| stat_title(name) == title;
-        let names: Vec<String> = info.stat_names.iter().filter(is_in).cloned().collect();
-        if !names.is_empty() {
-            let panel = plot_panel(title, topics::STATS, &names, &names, "floating");
-            below.push(add(format!("Plot!stats{index}"), panel));
+    for info in faces {
+        let units = UNITS.iter().map(|unit| unit.1).chain([COUNTS]);
+        for (index, title) in units.enumerate() {
+            let is_in = |name: &&String| stat_title(name) == title;
+            let names: Vec<String> = info.stat_names.iter().filter(is_in).cloned().collect();
+            if !names.is_empty() {
+                let topic = info.topic(topics::STATS);
+                let panel = plot_panel(&named(title, info), &topic, &names, &names, "floating");
+                below.push(add(named(&format!("Plot!stats{index}"), info), panel));
+            }
         }
     }
-    let log = json!({ "searchTerms": [], "minLogLevel": 1, "topicToRender": topics::LOG });
+    let log = faces
+        .first()
+        .map_or_else(String::new, |info| info.topic(topics::LOG));
+    let log = json!({ "searchTerms": [], "minLogLevel": 1, "topicToRender": log });
     below.push(add("RosOut!log".to_owned(), log));
     let half = below.len().div_ceil(2);
     let second = below.split_off(half);
@@ -94,14 +108,15 @@ pub fn foxglove_layout(info: &RecordingInfo, options: &RecordingOptions) -> Stri
         columns.push(split("row", second));
     }
     let plots = split("column", columns);
-    let lower = match weights {
-        Some(weights) => json!({
+    let lower = if weights.is_empty() {
+        plots
+    } else {
+        json!({
             "direction": "row",
             "splitPercentage": 42,
-            "first": weights,
+            "first": split("column", weights),
             "second": plots,
-        }),
-        None => plots,
+        })
     };
     let layout = json!({
         "configById": panels,
@@ -146,7 +161,7 @@ fn split(direction: &str, mut panels: Vec<Value>) -> Value {
     })
 }
 
-fn scene_panel(title: &str, visible: &[&str]) -> Value {
+fn scene_panel(title: &str, visible: &[&str], faces: &[&RecordingInfo]) -> Value {
     let all = [
         topics::SKIN,
         topics::PATCHES,
@@ -158,13 +173,19 @@ fn scene_panel(title: &str, visible: &[&str]) -> Value {
         topics::PATCH_POINTS,
         topics::MAGNETS,
     ];
-    let topics: Map<String, Value> = all
-        .iter()
-        .map(|topic| {
-            let settings = json!({ "visible": visible.contains(topic), "pointSize": 3 });
-            ((*topic).to_owned(), settings)
-        })
-        .collect();
+    let (mut topics, mut frames) = (Map::new(), Map::new());
+    let hidden = json!({ "visible": false });
+    frames.insert("frame:world".to_owned(), hidden.clone());
+    for info in faces {
+        for topic in all {
+            let settings = json!({ "visible": visible.contains(&topic), "pointSize": 3 });
+            topics.insert(info.topic(topic), settings);
+        }
+        let names = FrameNames::of(&info.face);
+        for frame in [names.rig, names.head] {
+            frames.insert(format!("frame:{frame}"), hidden.clone());
+        }
+    }
     json!({
         "foxglovePanelTitle": title,
         "lichtblickPanelTitle": title,
@@ -183,11 +204,7 @@ fn scene_panel(title: &str, visible: &[&str]) -> Value {
             "far": 1000,
         },
         "scene": { "backgroundColor": "#22262b", "labelScaleFactor": 0 },
-        "transforms": {
-            "frame:world": { "visible": false },
-            "frame:rig": { "visible": false },
-            "frame:head": { "visible": false },
-        },
+        "transforms": frames,
         "topics": topics,
         "layers": {},
         "publish": {},
@@ -236,6 +253,7 @@ mod tests {
     fn info() -> RecordingInfo {
         let words = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
         RecordingInfo {
+            face: String::new(),
             rig: "ball".to_owned(),
             template: "none".to_owned(),
             fps: 60.0,
@@ -262,7 +280,7 @@ mod tests {
             strain_hz,
             ..RecordingOptions::default()
         };
-        serde_json::from_str(&foxglove_layout(info, &options)).expect("JSON")
+        serde_json::from_str(&foxglove_layout(&[info], &options)).expect("JSON")
     }
 
     /// Panels at the ends of the tree.
@@ -288,6 +306,26 @@ mod tests {
             assert!(panels.keys().eq(&shown), "{shown:?}");
             assert_eq!(shown.contains(&"3D!strain".to_owned()), strain_hz > 0.0);
         }
+    }
+
+    #[test]
+    fn faces_share_the_views_and_have_plots_of_their_own() {
+        let [ann, bob] = ["ann", "bob"].map(|face| RecordingInfo {
+            face: face.to_owned(),
+            ..info()
+        });
+        let text = foxglove_layout(&[&ann, &bob], &RecordingOptions::default());
+        let layout: Value = serde_json::from_str(&text).expect("JSON");
+        let mut shown = Vec::new();
+        leaves(&layout["layout"], &mut shown);
+        shown.sort();
+        let panels = layout["configById"].as_object().expect("panels");
+        assert!(panels.keys().eq(&shown), "{shown:?}");
+        let skin = &panels["3D!skin"]["topics"];
+        assert_eq!(skin["/ann/rig/skin"]["visible"], true);
+        assert_eq!(skin["/bob/rig/skin"]["visible"], true);
+        let line = &panels["Plot!weights bob"]["paths"][0]["value"];
+        assert_eq!(line, "/bob/weights.shape0");
     }
 
     #[test]

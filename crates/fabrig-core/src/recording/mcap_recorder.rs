@@ -1,5 +1,6 @@
 //! The writer: frames in, one MCAP file out.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -10,13 +11,17 @@ use super::frame::{NORMAL_STEP, POSITION_STEP, UNITS_PER_MM, topics};
 use super::frame_encoder::log_message;
 use super::{
     Frame, FrameEncoder, LogEvent, LogLevel, RecordingError, RecordingInfo, RecordingOptions,
-    RecordingReport, TopicReport,
+    RecordingReport, TopicReport, foxglove_layout,
 };
 
 /// One topic of the file being written.
 struct Channel {
     id: u16,
+    /// Place of its face among the encoders.
+    face: usize,
     topic: &'static str,
+    /// With the face's name before it.
+    full_topic: String,
     messages: u64,
     raw_bytes: u64,
 }
@@ -34,7 +39,8 @@ pub struct McapRecorder {
     writer: Option<BackgroundWriter<BufWriter<File>>>,
     path: PathBuf,
     partial_path: PathBuf,
-    encoder: FrameEncoder,
+    /// One a face.
+    encoders: Vec<FrameEncoder>,
     flush_secs: f64,
     channels: Vec<Channel>,
     last_flush_nanos: u64,
@@ -52,7 +58,25 @@ impl McapRecorder {
         info: RecordingInfo,
         options: RecordingOptions,
     ) -> Result<Self, RecordingError> {
-        let encoder = FrameEncoder::new(info, options)?;
+        Self::create_with(path, vec![info], options)
+    }
+
+    /// Opens a recording of several faces, each with a [`RecordingInfo::face`] of its own, at one
+    /// frame rate. Frames are written with [`Self::record_face`], one of each face in turn.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::create`].
+    pub fn create_with(
+        path: impl AsRef<Path>,
+        faces: Vec<RecordingInfo>,
+        options: RecordingOptions,
+    ) -> Result<Self, RecordingError> {
+        check_faces(&faces)?;
+        let encoders = faces
+            .into_iter()
+            .map(|info| FrameEncoder::new(info, options))
+            .collect::<Result<Vec<_>, _>>()?;
         let path = path.as_ref().to_owned();
         let partial_path = partial_path(&path)?;
         let io_error = |action, source| RecordingError::Io {
@@ -63,14 +87,14 @@ impl McapRecorder {
         let file = File::create(&partial_path).map_err(|e| io_error("create", e))?;
         let file = BufWriter::with_capacity(1 << 20, file);
         let mut channels = Vec::new();
-        let writer = open_topics(&encoder, &mut channels, file)
+        let writer = open_topics(&encoders, &options, &mut channels, file)
             .and_then(|container| BackgroundWriter::new(container, options.chunk_bytes))
             .map_err(|e| io_error("write", e))?;
         Ok(Self {
             writer: Some(writer),
             path,
             partial_path,
-            encoder,
+            encoders,
             flush_secs: options.flush_secs,
             channels,
             last_flush_nanos: 0,
@@ -79,12 +103,12 @@ impl McapRecorder {
 
     /// Simulated time of the next frame. (ns)
     pub fn log_time_nanos(&self) -> u64 {
-        self.encoder.log_time_nanos()
+        self.encoders.last().map_or(0, FrameEncoder::log_time_nanos)
     }
 
     /// Frames recorded so far.
     pub fn frame_count(&self) -> u64 {
-        self.encoder.frame_count()
+        self.encoders.last().map_or(0, FrameEncoder::frame_count)
     }
 
     /// Writes one frame.
@@ -95,22 +119,41 @@ impl McapRecorder {
     /// not fit, of which nothing is written; [`RecordingError::Io`] and
     /// [`RecordingError::Container`] when writing fails.
     pub fn record(&mut self, frame: &Frame<'_>) -> Result<(), RecordingError> {
+        self.record_face(0, frame)
+    }
+
+    /// Writes one frame of one face.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::record`]; [`RecordingError::Info`] for a face that was not announced, or out of
+    /// turn.
+    pub fn record_face(&mut self, face: usize, frame: &Frame<'_>) -> Result<(), RecordingError> {
         let now = self.log_time_nanos();
+        let count = self.encoders.len();
         let Self {
             writer,
             channels,
             partial_path,
-            encoder,
+            encoders,
             ..
         } = self;
+        let Some(encoder) = encoders.get_mut(face).filter(|e| e.log_time_nanos() == now) else {
+            return Err(RecordingError::Info {
+                reason: format!("it is not the turn of face {face} of {count}"),
+            });
+        };
         encoder.encode(frame, &mut |topic, now, data| {
-            send(writer.as_mut(), channels, topic, now, data).map_err(|source| RecordingError::Io {
-                action: "write",
-                path: partial_path.clone(),
-                source,
+            send(writer.as_mut(), channels, (face, topic), now, data).map_err(|source| {
+                RecordingError::Io {
+                    action: "write",
+                    path: partial_path.clone(),
+                    source,
+                }
             })
         })?;
-        if (now - self.last_flush_nanos) as f64 >= self.flush_secs * 1e9 {
+        let is_last = face + 1 == count;
+        if is_last && (now - self.last_flush_nanos) as f64 >= self.flush_secs * 1e9 {
             self.last_flush_nanos = now;
             let flushed = match &mut self.writer {
                 Some(writer) => writer.flush(),
@@ -140,7 +183,7 @@ impl McapRecorder {
             normal_error: f64::from(NORMAL_STEP) / 2.0,
             topics: used
                 .map(|channel| TopicReport {
-                    topic: channel.topic.to_owned(),
+                    topic: channel.full_topic.clone(),
                     messages: channel.messages,
                     raw_bytes: channel.raw_bytes,
                 })
@@ -166,7 +209,7 @@ impl McapRecorder {
         send(
             self.writer.as_mut(),
             &mut self.channels,
-            topics::LOG,
+            (0, topics::LOG),
             now,
             &data,
         )
@@ -201,25 +244,85 @@ impl Drop for McapRecorder {
     }
 }
 
+/// Refuses faces that could not be told apart.
+fn check_faces(faces: &[RecordingInfo]) -> Result<(), RecordingError> {
+    let refuse = |reason: String| Err(RecordingError::Info { reason });
+    let Some(first) = faces.first() else {
+        return refuse("a recording needs a face".to_owned());
+    };
+    for (index, info) in faces.iter().enumerate() {
+        if faces.len() > 1 && info.face.is_empty() {
+            return refuse(format!("face {index} of {} has no name", faces.len()));
+        }
+        if faces[..index].iter().any(|other| other.face == info.face) {
+            return refuse(format!("two faces are called `{}`", info.face));
+        }
+        if info.fps != first.fps {
+            return refuse(format!(
+                "`{}` has {} frames a second, `{}` has {}",
+                info.face, info.fps, first.face, first.fps
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What a recording says of itself. Where faces differ in something, each says it with its name
+/// before.
+fn metadata_of(encoders: &[FrameEncoder]) -> BTreeMap<String, String> {
+    let [first, others @ ..] = encoders else {
+        return BTreeMap::new();
+    };
+    if others.is_empty() {
+        return first.metadata();
+    }
+    let each: Vec<_> = encoders
+        .iter()
+        .map(|e| (&e.info().face, e.metadata()))
+        .collect();
+    let names: Vec<&str> = each.iter().map(|(face, _)| face.as_str()).collect();
+    let mut metadata = BTreeMap::from([("faces".to_owned(), names.join(","))]);
+    for (face, own) in &each {
+        for (key, value) in own {
+            let is_shared = each.iter().all(|(_, other)| other.get(key) == Some(value));
+            let key = if is_shared {
+                key.clone()
+            } else {
+                format!("{face}/{key}")
+            };
+            metadata.insert(key, value.clone());
+        }
+    }
+    metadata
+}
+
 /// Begins a file with everything but messages.
 fn open_topics(
-    encoder: &FrameEncoder,
+    encoders: &[FrameEncoder],
+    options: &RecordingOptions,
     channels: &mut Vec<Channel>,
     file: BufWriter<File>,
 ) -> io::Result<ContainerWriter<BufWriter<File>>> {
     let library = concat!("fabrig/", env!("CARGO_PKG_VERSION"));
-    let mut writer = ContainerWriter::new(file, library, encoder.frame_bytes())?;
-    writer.add_metadata("fabrig", &encoder.metadata())?;
-    let layout = encoder.layout().into_bytes();
+    let frame_bytes = encoders.iter().map(FrameEncoder::frame_bytes).sum();
+    let mut writer = ContainerWriter::new(file, library, frame_bytes)?;
+    writer.add_metadata("fabrig", &metadata_of(encoders))?;
+    let infos: Vec<&RecordingInfo> = encoders.iter().map(FrameEncoder::info).collect();
+    let layout = foxglove_layout(&infos, options).into_bytes();
     writer.attach("fabrig.foxglove.json", "application/json", &layout)?;
-    for topic in encoder.topics() {
-        let schema = writer.add_schema(topic.schema, &topic.descriptors)?;
-        channels.push(Channel {
-            id: writer.add_channel(schema, topic.topic, &topic.metadata)?,
-            topic: topic.topic,
-            messages: 0,
-            raw_bytes: 0,
-        });
+    for (face, encoder) in encoders.iter().enumerate() {
+        for topic in encoder.topics() {
+            let schema = writer.add_schema(topic.schema, &topic.descriptors)?;
+            let full_topic = encoder.info().topic(topic.topic);
+            channels.push(Channel {
+                id: writer.add_channel(schema, &full_topic, &topic.metadata)?,
+                face,
+                topic: topic.topic,
+                full_topic,
+                messages: 0,
+                raw_bytes: 0,
+            });
+        }
     }
     Ok(writer)
 }
@@ -228,11 +331,11 @@ fn open_topics(
 fn send(
     writer: Option<&mut BackgroundWriter<BufWriter<File>>>,
     channels: &mut [Channel],
-    topic: &str,
+    topic: (usize, &str),
     now: u64,
     data: &[u8],
 ) -> io::Result<()> {
-    let Some(channel) = channels.iter_mut().find(|c| c.topic == topic) else {
+    let Some(channel) = channels.iter_mut().find(|c| (c.face, c.topic) == topic) else {
         return Ok(());
     };
     let writer = writer.ok_or_else(closed)?;

@@ -174,7 +174,11 @@ impl MessageReader {
                         return self.end_by(McapError::UnknownChannel(sequence, channel));
                     };
                     self.messages += 1;
-                    self.frames += usize::from(self.topics[topic].topic == topics::TF);
+                    let first = self
+                        .topics
+                        .iter()
+                        .position(|t| t.topic.ends_with(topics::TF));
+                    self.frames += usize::from(first == Some(topic));
                     return Ok(Some(RecordedMessage {
                         topic,
                         log_time: header.log_time,

@@ -11,6 +11,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use prost::Message;
 
+use super::encode::FrameNames;
 use super::frame::{UNITS_PER_MM, topics};
 use super::messages::{Color, FrameTransforms, SceneUpdate};
 use super::{RecordingError, SurfaceInfo};
@@ -51,6 +52,8 @@ pub struct RecordingReader {
     is_recovering: bool,
     is_done: bool,
     metadata: BTreeMap<String, String>,
+    /// The face that is read, where there are several; empty where there is one.
+    face: String,
     topics: HashMap<u16, String>,
     pending: Option<(u64, RecordedFrame)>,
     frames: usize,
@@ -62,9 +65,19 @@ impl RecordingReader {
     /// # Errors
     ///
     /// [`RecordingError::Io`], [`RecordingError::Container`] for a file that is no MCAP file,
-    /// [`RecordingError::NotARecording`] for one without our metadata.
+    /// [`RecordingError::NotARecording`] for one without our metadata,
+    /// [`RecordingError::SeveralFaces`] for one of several.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
-        Self::start(path.as_ref(), false)
+        Self::start(path.as_ref(), false, None)
+    }
+
+    /// Opens a recording of several faces to read one of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`]; [`RecordingError::NoSuchFace`].
+    pub fn open_face(path: impl AsRef<Path>, face: &str) -> Result<Self, RecordingError> {
+        Self::start(path.as_ref(), false, Some(face))
     }
 
     /// Opens what a killed recorder left: the end of the file, wherever it is, ends the frames.
@@ -73,10 +86,19 @@ impl RecordingReader {
     ///
     /// As [`Self::open`].
     pub fn with_recovery(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
-        Self::start(path.as_ref(), true)
+        Self::start(path.as_ref(), true, None)
     }
 
-    fn start(path: &Path, is_recovering: bool) -> Result<Self, RecordingError> {
+    /// As [`Self::with_recovery`], one of several faces.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open_face`].
+    pub fn face_with_recovery(path: impl AsRef<Path>, face: &str) -> Result<Self, RecordingError> {
+        Self::start(path.as_ref(), true, Some(face))
+    }
+
+    fn start(path: &Path, is_recovering: bool, face: Option<&str>) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(|source| RecordingError::Io {
             action: "open",
             path: path.to_owned(),
@@ -94,6 +116,7 @@ impl RecordingReader {
             is_recovering,
             is_done: false,
             metadata: BTreeMap::new(),
+            face: face.unwrap_or_default().to_owned(),
             topics: HashMap::new(),
             pending: None,
             frames: 0,
@@ -106,7 +129,32 @@ impl RecordingReader {
                 });
             }
         }
-        Ok(reader)
+        let known: Vec<&str> = reader.faces().collect();
+        if known.contains(&reader.face.as_str()) || known.is_empty() && face.is_none() {
+            return Ok(reader);
+        }
+        let faces = known.join(", ");
+        Err(match face {
+            None => RecordingError::SeveralFaces {
+                path: path.to_owned(),
+                faces,
+            },
+            Some(found) => RecordingError::NoSuchFace {
+                path: path.to_owned(),
+                found: found.to_owned(),
+                faces: if known.is_empty() {
+                    "one without a name".to_owned()
+                } else {
+                    faces
+                },
+            },
+        })
+    }
+
+    /// Names of its faces, where it has several; none where it has one.
+    pub fn faces(&self) -> impl Iterator<Item = &str> {
+        let names = self.metadata.get("faces").into_iter();
+        names.flat_map(|names| names.split(','))
     }
 
     /// What the recording says of itself: `rig`, `template`, `fps`, `seed`, `version`, ...
@@ -231,6 +279,14 @@ impl RecordingReader {
         sequence: u32,
         data: &[u8],
     ) -> Result<(), RecordingError> {
+        let own = match self.face.as_str() {
+            "" => Some(topic),
+            face => topic.strip_prefix('/').and_then(|t| t.strip_prefix(face)),
+        };
+        // What is of other faces goes by; their names may begin alike.
+        let Some(own) = own.filter(|own| own.starts_with('/')) else {
+            return Ok(());
+        };
         let (_, frame) = self.pending.get_or_insert_with(|| {
             let frame = RecordedFrame {
                 time_secs: nanos as f64 / 1e9,
@@ -249,10 +305,10 @@ impl RecordingReader {
             sequence,
             source,
         };
-        match topic {
+        match own {
             topics::TF => {
                 let message = FrameTransforms::decode(data).map_err(message_error)?;
-                if let Some(head) = head_of(&message) {
+                if let Some(head) = head_of(&message, &FrameNames::of(&self.face)) {
                     frame.head = head;
                 }
             }
@@ -267,7 +323,7 @@ impl RecordingReader {
                         path: self.path.clone(),
                         reason: format!("message {sequence} on `{topic}`: {reason}"),
                     })?;
-                match topic {
+                match own {
                     topics::SKIN => frame.skin = surfaces.into_iter().next(),
                     topics::PATCHES => frame.patches = surfaces,
                     topics::COLLIDERS => frame.colliders = surfaces,
@@ -281,11 +337,11 @@ impl RecordingReader {
     }
 }
 
-fn head_of(message: &FrameTransforms) -> Option<Isometry3<f64>> {
+fn head_of(message: &FrameTransforms, names: &FrameNames) -> Option<Isometry3<f64>> {
     let head = message
         .transforms
         .iter()
-        .find(|t| t.child_frame_id == super::encode::HEAD_FRAME)?;
+        .find(|t| t.child_frame_id == names.head)?;
     let (t, q) = (head.translation.as_ref()?, head.rotation.as_ref()?);
     Some(Isometry3::from_parts(
         Translation3::new(t.x / UNITS_PER_MM, t.y / UNITS_PER_MM, t.z / UNITS_PER_MM),

@@ -33,8 +33,9 @@ pub fn face_bench_scene(
     simulation.reset(pose)?;
     let mut frames = vec![simulation.cloth_frame(dt)];
     for frame in 1..=range.len() {
-        let pose = simulation.pose_at(start + frame as f64 * dt);
-        simulation.pose_to(pose)?;
+        let time = start + frame as f64 * dt;
+        let pose = simulation.pose_at(time);
+        simulation.pose_to(pose, time)?;
         frames.push(simulation.cloth_frame(dt));
     }
     Ok(BenchScene::new(

@@ -10,6 +10,7 @@ use crate::collision::{
 use crate::rig::Rig;
 use crate::scene::Scene;
 use crate::scene::bodies::Eyeball;
+use crate::scene::modelled::Modelled;
 use nalgebra::Point3;
 
 /// Deeper nodes than this are covered no more: the tissue over them gives way. (mm)
@@ -28,19 +29,23 @@ pub(super) struct FaceContact {
 
 impl FaceContact {
     /// Contact as a scene asks for it; none where nothing could touch.
+    ///
+    /// - `patches`: those that are cloth, as `modelled` says
     pub(super) fn new(
         rig: &Rig,
         scene: &Scene,
         patches: &[ClothPatch],
+        modelled: &Modelled,
         eyeballs: &[Eyeball; 2],
     ) -> Result<Option<Self>, CollisionError> {
         scene.contact.check()?;
         if !scene.has_contact() {
             return Ok(None);
         }
-        let of_contact: Vec<ContactPatch> = rig
-            .patches
+        let of_contact: Vec<ContactPatch> = modelled
+            .patches()
             .iter()
+            .map(|&patch| &rig.patches[patch])
             .zip(patches)
             .map(|(own, cloth)| {
                 let chart = &own.patch.chart;
@@ -57,7 +62,7 @@ impl FaceContact {
                         .attachments
                         .iter()
                         .filter_map(|a| match a {
-                            Attachment::Patch { patch, .. } => Some(*patch as usize),
+                            Attachment::Patch { patch, .. } => modelled.cloth_of(*patch as usize),
                             Attachment::Body { .. } => None,
                         })
                         .collect(),

@@ -1,11 +1,18 @@
 //! What a scene models, as plain data.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::faces::{Placement, RecordingChoice, SceneFace, Simulate};
+use super::fields::{HeadDrive, OverTime, RadialForce, Shake, Turbulence};
+use super::text::{self, SceneSource};
 use crate::Point;
 use crate::cloth::{ClothOptions, STANDING_GRAVITY};
 use crate::collision::{Collider, ContactOptions, PairMask};
+use crate::edit::{MaterialEdit, WrinkleEdit};
 use crate::scene::SceneError;
 
 /// Whether patches have mass.
@@ -31,6 +38,9 @@ pub enum EyeSource {
 }
 
 /// What to model around a rig and its motion.
+///
+/// Times are on the scene's axis: seconds from the start of the scene where it has
+/// [`faces`](Self::faces), the take's own time where rig and take are given by the caller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scene {
@@ -40,19 +50,45 @@ pub struct Scene {
     pub cloth: ClothOptions,
     /// Gravity in the world. The face was captured under standing gravity, so only what
     /// differs from that, seen from the head, bends it. (mm/s^2)
-    pub gravity: Vector3<f32>,
+    pub gravity: OverTime<Vector3<f32>>,
     /// Velocity of the air in the world, added to the take's own wind. (mm/s)
-    pub wind: Vector3<f32>,
-    /// Whether the take moves the head.
-    pub head_motion: bool,
+    pub wind: OverTime<Vector3<f32>>,
+    /// Gusts in the wind.
+    pub turbulence: Option<Turbulence>,
+    /// A shaking of everything around the face.
+    pub shake: Option<Shake>,
+    /// Pushes away from points, and pulls towards them.
+    pub forces: Vec<RadialForce>,
+    /// What moves the head: the take, keys, or nothing.
+    pub head_motion: HeadDrive,
     /// The point that the head turns about. [mm, head frame]
     pub neck_pivot: Point,
+    /// Where the face stands in the world before the head moves.
+    pub place: Placement,
     /// What turns the eyeballs.
     pub eyes: EyeSource,
     /// What touches what, and how.
     pub contact: ContactOptions,
     /// Things of the world that the face can touch.
     pub colliders: Vec<Collider>,
+    /// Which patches are cloth.
+    pub simulate: Simulate,
+    /// Changes to the materials of the rig, and materials of the scene's own, by name.
+    pub materials: BTreeMap<String, MaterialEdit>,
+    /// Wrinkle maps, by names of the artist's own.
+    pub wrinkles: BTreeMap<String, WrinkleEdit>,
+    /// Frames a second of the simulation; the take's own when not said. (1/s)
+    pub fps: Option<f64>,
+    /// Duration of a scene with [`faces`](Self::faces); until the last take ends when not said.
+    /// (s)
+    pub duration: Option<f64>,
+    /// What is recorded.
+    pub recording: RecordingChoice,
+    /// Faces with their takes; none where the caller gives rig and take.
+    pub faces: Vec<SceneFace>,
+    /// Where it was read from; no part of what it says.
+    #[serde(skip)]
+    pub source: SceneSource,
 }
 
 impl Default for Scene {
@@ -60,13 +96,25 @@ impl Default for Scene {
         Self {
             dynamics: Dynamics::default(),
             cloth: ClothOptions::default(),
-            gravity: Vector3::from(STANDING_GRAVITY),
-            wind: Vector3::zeros(),
-            head_motion: true,
+            gravity: STANDING_GRAVITY.into(),
+            wind: [0.0; 3].into(),
+            turbulence: None,
+            shake: None,
+            forces: Vec::new(),
+            head_motion: HeadDrive::Take(true),
             neck_pivot: Point::new(0.0, -45.0, -20.0),
+            place: Placement::default(),
             eyes: EyeSource::default(),
             contact: ContactOptions::default(),
             colliders: Vec::new(),
+            simulate: Simulate::default(),
+            materials: BTreeMap::new(),
+            wrinkles: BTreeMap::new(),
+            fps: None,
+            duration: None,
+            recording: RecordingChoice::default(),
+            faces: Vec::new(),
+            source: SceneSource::default(),
         }
     }
 }
@@ -78,7 +126,8 @@ impl Scene {
         self.dynamics == Dynamics::Cloth && is_asked_for
     }
 
-    /// Reads a scene from text (TOML); what it leaves out is as by default.
+    /// Reads a scene from text (TOML); what it leaves out is as by default, and files that it
+    /// names are looked for in the working folder.
     ///
     /// ```
     /// let text = "gravity = [0, 0, 0]\n[contact]\npairs = \"all\"\nsticky_lips = {}\n";
@@ -89,33 +138,33 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`SceneError::Text`] with line and column, [`SceneError::Collision`] for contact options
-    /// or colliders that cannot be.
+    /// [`SceneError::Text`], [`SceneError::UnknownKey`] and [`SceneError::Value`] with line and
+    /// column, [`SceneError::At`] around what another module refuses.
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
-        let scene = toml::from_str(text).map_err(|e| SceneError::Text {
-            reason: e.to_string(),
-        })?;
-        Self::checked(scene)
+        text::from_toml(text, Path::new(""))
     }
 
-    /// As [`Self::from_toml`], from JSON.
+    /// As [`Self::from_toml`], from JSON, whose places are the paths of keys.
     ///
     /// # Errors
     ///
     /// As [`Self::from_toml`].
     pub fn from_json(text: &str) -> Result<Self, SceneError> {
-        let scene = serde_json::from_str(text).map_err(|e| SceneError::Text {
-            reason: e.to_string(),
-        })?;
-        Self::checked(scene)
+        text::from_json(text)
     }
 
-    fn checked(scene: Self) -> Result<Self, SceneError> {
-        scene.contact.check()?;
-        for (index, collider) in scene.colliders.iter().enumerate() {
-            collider.check(index)?;
-        }
-        Ok(scene)
+    /// Reads a scene file (TOML); files that it names are looked for beside it.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Read`]; as [`Self::from_toml`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        text::from_toml(&text, path.parent().unwrap_or(Path::new("")))
     }
 
     /// The default scene without mass: patches stand where the muscle shapes want them.

@@ -8,14 +8,22 @@ mod contact;
 mod description;
 mod error;
 mod face_cases;
+mod faces;
+pub mod fields;
 mod head;
+mod modelled;
 mod simulation;
 mod skin_contact;
+#[cfg(test)]
+pub(crate) mod tests;
+mod text;
 
 pub use bench_face::{all_frames, face_bench_scene, liveliest_frames};
 pub use chain_loss::{LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss};
 pub use description::{Dynamics, EyeSource, Scene};
-pub use error::SceneError;
+pub use error::{Hint, SceneError, TextPlace};
 pub use face_cases::face_cases;
+pub use faces::{Placement, RecordingChoice, SceneFace, Simulate};
 pub use simulation::{FacePose, FrameReport, PartPose, Simulation, cloth_patches};
 pub use skin_contact::SkinContactReport;
+pub use text::{SceneSource, annotated_scene};

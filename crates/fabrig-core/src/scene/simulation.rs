@@ -17,7 +17,9 @@ use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
 use crate::scene::bodies::{Eyeball, eyeballs};
 use crate::scene::contact::FaceContact;
+use crate::scene::fields::{Curve, Fields, HeadDrive, keyed_head};
 use crate::scene::head::{head_motion, head_to_world};
+use crate::scene::modelled::{Modelled, middle};
 use crate::scene::skin_contact::{SkinContact, SkinContactReport};
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
@@ -27,6 +29,8 @@ use crate::{Point, Vector};
 
 /// Distance in time over which the motion of the head is differentiated. (s)
 const HEAD_STEP: f64 = 1.0 / 60.0;
+/// Further than this from its ends a take is over, and its weights are held. (s)
+const AT_THE_END: f64 = 1e-6;
 
 /// What drives a face at one instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,13 +39,15 @@ pub struct FacePose {
     pub weights: Vec<f32>,
     /// Rate of each weight. (1/s)
     pub rates: Vec<f32>,
-    /// From the head frame to the world. (mm)
+    /// From the head frame to where the head has moved, before the scene places the face in its
+    /// world. (mm)
     pub head: Isometry3<f64>,
     /// How the head frame moves.
     pub head_motion: HeadMotion,
     /// Where the eyes look, where the take says so.
     pub eyes: Option<[EyeAngles; 2]>,
-    /// Velocity of the air relative to the head, in world axes. (mm/s)
+    /// Velocity of the air relative to the head, in the axes that [`Self::head`] leads to.
+    /// (mm/s)
     pub wind: Vector,
 }
 
@@ -100,6 +106,14 @@ pub struct Simulation {
     pose: FacePose,
     sample: Sample,
     cloth: Option<Cloth>,
+    modelled: Modelled,
+    fields: Fields,
+    /// Where fields are felt, for the whole face. [mm, head frame]
+    middle: Point,
+    /// The head's keys, where it has any.
+    head_keys: Option<Curve<6>>,
+    /// From the head frame to the world, with where the face stands in it. (mm)
+    world: Isometry3<f64>,
     contact: Option<FaceContact>,
     skin_contact: Option<SkinContact>,
     skin_report: SkinContactReport,
@@ -119,7 +133,13 @@ impl Simulation {
     ///
     /// [`SceneError`] where the rig's materials or sizes do not fit.
     pub fn new(rig: Arc<Rig>, scene: Scene, clip: Option<Clip>) -> Result<Self, SceneError> {
-        let patches = cloth_patches(&rig)?;
+        if !scene.faces.is_empty() {
+            return Err(SceneError::HasFaces {
+                count: scene.faces.len(),
+            });
+        }
+        let rig = scene.dressed(rig)?;
+        let (modelled, patches) = Modelled::new(&rig, &scene, cloth_patches(&rig)?)?;
         let names: Vec<&str> = rig.shape_names.iter().map(String::as_str).collect();
         let channels = clip
             .as_ref()
@@ -134,7 +154,7 @@ impl Simulation {
             Dynamics::None => None,
         };
         let eyeballs = eyeballs(&rig);
-        let mut contact = FaceContact::new(&rig, &scene, &patches, &eyeballs)?;
+        let mut contact = FaceContact::new(&rig, &scene, &patches, &modelled, &eyeballs)?;
         let skin = rig.skin_at_rest();
         let skin_contact = SkinContact::new(&rig, &scene, &eyeballs, &skin)?;
         if let (Some(of_cloth), Some(of_skin)) = (&mut contact, &skin_contact) {
@@ -143,8 +163,17 @@ impl Simulation {
         let deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
         let count = rig.patches.len();
         let time = clip.as_ref().map_or(0.0, |c| c.times()[0]);
+        let head_keys = match &scene.head_motion {
+            HeadDrive::Keyed(keys) => Some(keys.curve()),
+            HeadDrive::Take(_) => None,
+        };
         let mut simulation = Self {
             pose: FacePose::neutral(rig.shape_names.len()),
+            modelled,
+            fields: Fields::new(&scene),
+            middle: middle(&rig),
+            head_keys,
+            world: Isometry3::identity(),
             rig,
             scene,
             clip,
@@ -168,40 +197,91 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// What the clip says at a time; the pose held last where there is no clip.
+    /// Begins at another time: the face is put into its pose there at once.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::reset`].
+    pub fn start_at(&mut self, time: f64) -> Result<(), SceneError> {
+        self.time = time;
+        let pose = self.pose_at(time);
+        self.reset(pose)
+    }
+
+    /// What the clip and the scene say at a time. Without a clip weights and eyes are those held
+    /// last, and so is the head where no keys move it.
     pub fn pose_at(&mut self, time: f64) -> FacePose {
-        let Some(clip) = &self.clip else {
-            return self.pose.clone();
-        };
-        clip.sample_into(time, &mut self.sample);
-        let sample = &self.sample;
-        let pick = |of: &[f32]| -> Vec<f32> {
-            self.channels
-                .iter()
-                .map(|c| c.map_or(0.0, |c| of[c]))
-                .collect()
-        };
-        let mut pose = FacePose {
-            weights: pick(&sample.weights),
-            rates: pick(&sample.rates),
-            eyes: sample.eyes,
-            wind: sample.wind + self.scene.wind.cast::<f64>(),
-            ..FacePose::neutral(0)
-        };
-        if self.scene.head_motion && !clip.tracks().head.is_empty() {
-            let pivot = self.scene.neck_pivot;
-            let now = head_to_world(&sample.head, &pivot);
-            let mut at = |time| {
+        let (mut pose, take_wind, take_moves_head) = match &self.clip {
+            None => (self.pose.clone(), Vector::zeros(), false),
+            Some(clip) => {
                 clip.sample_into(time, &mut self.sample);
-                head_to_world(&self.sample.head, &pivot)
-            };
-            let (before, after) = (at(time - HEAD_STEP), at(time + HEAD_STEP));
+                let sample = &self.sample;
+                let pick = |of: &[f32]| -> Vec<f32> {
+                    self.channels
+                        .iter()
+                        .map(|c| c.map_or(0.0, |c| of[c]))
+                        .collect()
+                };
+                let mut pose = FacePose {
+                    weights: pick(&sample.weights),
+                    rates: pick(&sample.rates),
+                    eyes: sample.eyes,
+                    ..FacePose::neutral(0)
+                };
+                let (first, last) = (clip.times()[0], clip.times()[0] + clip.duration());
+                if !(first - AT_THE_END..=last + AT_THE_END).contains(&time) {
+                    pose.rates.fill(0.0);
+                }
+                (pose, sample.wind, !clip.tracks().head.is_empty())
+            }
+        };
+        if self.head_keys.is_some()
+            || take_moves_head && self.scene.head_motion == HeadDrive::Take(true)
+        {
+            let now = self.head_at(time);
+            let (before, after) = (
+                self.head_at(time - HEAD_STEP),
+                self.head_at(time + HEAD_STEP),
+            );
             let (motion, velocity) = head_motion(&before, &now, &after, HEAD_STEP);
             pose.head = now;
             pose.head_motion = motion;
-            pose.wind -= velocity;
+            pose.wind = take_wind + self.air(&now, time) - velocity;
+        } else {
+            pose.wind = take_wind + self.air(&pose.head, time);
         }
         pose
+    }
+
+    /// Where the head is, by its keys or the clip. (mm)
+    fn head_at(&mut self, time: f64) -> Isometry3<f64> {
+        let pivot = self.scene.neck_pivot;
+        match (&self.head_keys, &self.clip) {
+            (Some(keys), _) => keyed_head(keys, time, &pivot),
+            (None, Some(clip)) => {
+                clip.sample_into(time, &mut self.sample);
+                head_to_world(&self.sample.head, &pivot)
+            }
+            (None, None) => self.pose.head,
+        }
+    }
+
+    /// Velocity of the scene's air at the face, in the axes of [`FacePose::wind`]: those of the
+    /// world, turned back by where the face stands. (mm/s)
+    ///
+    /// - `head`: as [`FacePose::head`]
+    pub fn air(&self, head: &Isometry3<f64>, time: f64) -> Vector {
+        let place = self.scene.place.to_world();
+        let at = place.map_or(*head, |place| place * head) * self.middle;
+        let wind = self.fields.wind(&at, time);
+        place.map_or(wind, |place| place.rotation.inverse() * wind)
+    }
+
+    /// Gravity and all that accelerates the face from outside at a time, in the head frame.
+    /// (mm/s^2)
+    fn acceleration(&self, time: f64) -> Vector {
+        let at = self.world * self.middle;
+        self.world.rotation.inverse() * self.fields.acceleration(&at, time, &self.world)
     }
 
     /// Puts the face into a pose at once: patches on their muscle shapes, moving as they do.
@@ -212,18 +292,18 @@ impl Simulation {
     pub fn reset(&mut self, pose: FacePose) -> Result<(), SceneError> {
         self.evaluate(pose)?;
         self.begin_contact(self.time);
+        let (targets, anchors) = self.modelled.gather(&self.targets, &self.anchors);
         match (&mut self.cloth, &mut self.contact) {
-            (Some(cloth), Some(c)) => {
-                cloth.reset_with(&self.targets, &self.anchors, &mut c.contact)?;
-            }
-            (Some(cloth), None) => cloth.reset(&self.targets, &self.anchors)?,
+            (Some(cloth), Some(c)) => cloth.reset_with(targets, anchors, &mut c.contact)?,
+            (Some(cloth), None) => cloth.reset(targets, anchors)?,
             (None, _) => {}
         }
         self.move_skin()
     }
 
-    /// Takes a pose without moving anything: only the muscle shapes are evaluated.
-    pub(super) fn pose_to(&mut self, pose: FacePose) -> Result<(), SceneError> {
+    /// Takes a pose at a time without moving anything: only the muscle shapes are evaluated.
+    pub(super) fn pose_to(&mut self, pose: FacePose, time: f64) -> Result<(), SceneError> {
+        self.time = time;
         self.evaluate(pose)
     }
 
@@ -253,13 +333,15 @@ impl Simulation {
 
         let clock = Instant::now();
         self.begin_contact(self.time + dt);
+        let gravity = self.acceleration(self.time + dt);
+        let (targets, anchors) = self.modelled.gather(&self.targets, &self.anchors);
         if let Some(cloth) = &mut self.cloth {
             let to_head = self.pose.head.rotation.inverse();
             let input = FrameInput {
                 dt,
-                targets: &self.targets,
-                anchors: &self.anchors,
-                gravity: Some((to_head * self.scene.gravity.cast::<f64>()).cast()),
+                targets,
+                anchors,
+                gravity: Some(gravity.cast()),
                 wind: (to_head * self.pose.wind).cast(),
                 head: self.pose.head_motion,
             };
@@ -289,7 +371,7 @@ impl Simulation {
             dt,
             targets: self.targets.clone(),
             anchors: self.anchors.clone(),
-            gravity: Some((to_head * self.scene.gravity.cast::<f64>()).cast()),
+            gravity: Some(self.acceleration(self.time).cast()),
             wind: (to_head * self.pose.wind).cast(),
             head: self.pose.head_motion,
         }
@@ -342,8 +424,16 @@ impl Simulation {
     pub fn judge_contact(&self) -> Result<Option<Verdict>, CollisionError> {
         self.contact
             .as_ref()
-            .map(|c| c.judge(|patch| self.patch_positions(patch)))
+            .map(|c| c.judge(|patch| self.patch_positions(self.modelled.patches()[patch])))
             .transpose()
+    }
+
+    /// How many patches are cloth.
+    pub fn simulated_patches(&self) -> usize {
+        match self.cloth {
+            Some(_) => self.modelled.patches().len(),
+            None => 0,
+        }
     }
 
     /// The rig.
@@ -391,9 +481,9 @@ impl Simulation {
             .collect()
     }
 
-    /// From the head frame to the world. (mm)
+    /// From the head frame to the world: the pose's, and where the face stands. (mm)
     pub fn head(&self) -> &Isometry3<f64> {
-        &self.pose.head
+        &self.world
     }
 
     /// Nodes of a patch now. [mm, head frame]
@@ -402,9 +492,9 @@ impl Simulation {
     ///
     /// If there is no such patch.
     pub fn patch_positions(&self, patch: usize) -> &[Point3<f32>] {
-        match &self.cloth {
-            Some(cloth) => cloth.positions(patch),
-            None => &self.targets[patch].positions,
+        match (&self.cloth, self.modelled.cloth_of(patch)) {
+            (Some(cloth), Some(own)) => cloth.positions(own),
+            _ => &self.targets[patch].positions,
         }
     }
 
@@ -467,6 +557,10 @@ impl Simulation {
             rates: Some(&pose.rates),
         };
         self.rig.targets(at, &mut self.evaluated)?;
+        self.world = match self.scene.place.to_world() {
+            Some(place) => place * pose.head,
+            None => pose.head,
+        };
         self.pose = pose;
         for (target, (positions, velocities)) in self.targets.iter_mut().zip(&mut self.evaluated) {
             std::mem::swap(&mut target.positions, positions);
@@ -483,15 +577,15 @@ impl Simulation {
     fn begin_contact(&mut self, time: f64) {
         let eyes = [0, 1].map(|e| self.eye(e));
         if let Some(contact) = &mut self.contact {
-            contact.begin_frame(time, &self.pose.head, eyes);
+            contact.begin_frame(time, &self.world, eyes);
         }
     }
 
     fn move_skin(&mut self) -> Result<(), SceneError> {
         let nodes: Vec<&[Point3<f32>]> = (0..self.targets.len())
-            .map(|patch| match &self.cloth {
-                Some(cloth) => cloth.positions(patch),
-                None => self.targets[patch].positions.as_slice(),
+            .map(|patch| match (&self.cloth, self.modelled.cloth_of(patch)) {
+                (Some(cloth), Some(own)) => cloth.positions(own),
+                _ => self.targets[patch].positions.as_slice(),
             })
             .collect();
         let mandible = self.rig.mandible(&self.pose.weights);

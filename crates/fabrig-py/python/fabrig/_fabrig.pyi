@@ -316,10 +316,11 @@ class Clip:
 class Simulation:
     def __new__(
         cls,
-        rig: Rig,
+        rig: Rig | None = None,
         clip: Clip | None = None,
         *,
         scene: SceneLike | None = None,
+        face: str | None = None,
         gravity: ArrayLike | None = None,
         wind: ArrayLike | None = None,
         substeps: int | None = None,
@@ -412,7 +413,9 @@ class RecordedFrame:
 
 @final
 class Recording:
-    def __new__(cls, path: Path, *, recover: bool = False) -> Self: ...
+    def __new__(
+        cls, path: Path, *, recover: bool = False, face: str | None = None
+    ) -> Self: ...
     @property
     def metadata(self) -> dict[str, str]: ...
     def __iter__(self) -> Recording: ...
@@ -490,6 +493,15 @@ def animate(
     layout: Path | None = None,
     progress: Progress = None,
 ) -> dict[str, Any]: ...
+def animate_scene(
+    scene: SceneLike,
+    output: Path,
+    *,
+    fps: float | None = None,
+    record: Sequence[str] | None = None,
+    layout: Path | None = None,
+    progress: Progress = None,
+) -> list[tuple[str, dict[str, Any]]]: ...
 def convert(
     recording: Path,
     output: Path,

@@ -1,0 +1,96 @@
+//! The text of a scene: what keys there are (`schema`), whether a text keeps to them (`check`),
+//! where everything stands in it (`source`), and a scene with every key explained (`show`).
+//!
+//! A text is checked against the schema before it becomes a [`Scene`], so that what is wrong is
+//! told with line, column, key, what was expected, and the nearest known name.
+
+mod check;
+mod node;
+mod schema;
+mod show;
+mod source;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+pub use show::annotated_scene;
+pub use source::SceneSource;
+
+use super::{Scene, SceneError, TextPlace};
+use check::{Checked, check_scene};
+use node::{Node, line_and_column};
+
+/// - `folder`: where files are that the text names
+pub(super) fn from_toml(text: &str, folder: &Path) -> Result<Scene, SceneError> {
+    let node = Node::of_toml(text)?;
+    let checked = check_scene(&node, Some(text))?;
+    let scene = toml::from_str(text).map_err(|error| SceneError::Text {
+        place: error
+            .span()
+            .map_or_else(TextPlace::default, |span| line_and_column(text, span.start)),
+        reason: one_line(error.message()),
+    })?;
+    finish(scene, checked, folder)
+}
+
+pub(super) fn from_json(text: &str) -> Result<Scene, SceneError> {
+    let failed = |error: serde_json::Error| SceneError::Text {
+        place: TextPlace::default(),
+        reason: one_line(&error.to_string()),
+    };
+    let value: serde_json::Value = serde_json::from_str(text).map_err(failed)?;
+    let node = Node::of_json(&value);
+    let checked = check_scene(&node, None)?;
+    let scene = serde_json::from_value(value).map_err(failed)?;
+    finish(scene, checked, Path::new(""))
+}
+
+/// What the schema cannot say: what options, colliders and names must be among each other.
+fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, SceneError> {
+    scene.source = SceneSource::new(folder, checked.places);
+    let source = &scene.source;
+    scene
+        .contact
+        .check()
+        .map_err(|error| source.at("contact", error))?;
+    for (index, collider) in scene.colliders.iter().enumerate() {
+        collider
+            .check(index)
+            .map_err(|error| source.at(&format!("colliders[{index}]"), error))?;
+    }
+    let names = |list: &str, names: Vec<String>| {
+        for (index, name) in names.iter().enumerate() {
+            if let Some(first) = names[..index].iter().position(|other| other == name) {
+                return Err(source.value(
+                    &format!("{list}[{index}].name"),
+                    "a name of its own".to_owned(),
+                    format!("'{name}', which is that of {list}[{first}] too"),
+                    None,
+                ));
+            }
+        }
+        Ok(())
+    };
+    names(
+        "colliders",
+        scene.colliders.iter().map(|c| c.name.clone()).collect(),
+    )?;
+    names(
+        "forces",
+        scene.forces.iter().map(|f| f.name.clone()).collect(),
+    )?;
+    names(
+        "faces",
+        scene
+            .faces
+            .iter()
+            .map(super::SceneFace::display_name)
+            .collect(),
+    )?;
+    Ok(scene)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
