@@ -109,7 +109,7 @@ fn the_schema_has_the_fields_of_the_types() {
     let keys_of = |name: &str| -> &'static [Key] {
         match SCENE.iter().find(|key| key.name == name).map(|k| k.kind) {
             Some(Kind::Table(keys) | Kind::Named(keys)) => keys,
-            Some(Kind::List(Kind::Table(keys))) => *keys,
+            Some(Kind::List(Kind::Table(keys))) => keys,
             other => panic!("{name}: {other:?}"),
         }
     };
