@@ -1,7 +1,7 @@
 """Every command of every document runs: what stands in ```sh blocks of README.md, docs and the guide.
 
 Each document has a folder of its own with the files that people bring: `face.obj`, `take.csv`,
-`landmarks.json`, `work.toml`, and what earlier commands of other documents make: `face.fabrig`,
+`landmarks.json`, `work.toml`, the scenes of docs/scenes, and what earlier commands of other documents make: `face.fabrig`,
 `out.mcap`. Commands are the documents', but for options that make them quick (smaller pictures,
 shapes that need not settle); the few that are not run are listed with the reason.
 """
@@ -72,6 +72,8 @@ def brought(tmp_path_factory):
     rig.save(folder / "face.fabrig")
     (folder / "take.csv").write_text(TAKE)
     (folder / "work.toml").write_text(WORK)
+    for scene in (ROOT / "docs/scenes").glob("*.toml"):
+        shutil.copy(scene, folder)
     places = fabrig.template().landmarks
     to_own = [list(row) for row in np.linalg.inv(rig.to_head)]
     names = ("nose_tip", "menton", "eye_inner_l", "eye_inner_r", "lip_corner_l")

@@ -145,6 +145,49 @@ fn rigs() {
 }
 
 #[test]
+fn scenes() {
+    let case = Case::new();
+    for (name, content, parts) in [
+        (
+            "key.toml",
+            "fps = 30\n[contact]\n  frction = 0.1\n",
+            &["key.toml", "line 3, column 3", "`frction`", "`friction`"][..],
+        ),
+        (
+            "word.toml",
+            "[contact]\npairs = \"al\"\n",
+            &["line 2, column 9", "`contact.pairs`", "mean `all`"],
+        ),
+        (
+            "range.toml",
+            "[turbulence]\nlength = -3\n",
+            &["line 2, column 10", "`turbulence.length`", "from 0.1", "-3"],
+        ),
+        (
+            "file.toml",
+            "[[faces]]\nrig = \"range.tom\"\n",
+            &["line 2, column 7", "`faces[0].rig`", "a file that is there"],
+        ),
+        (
+            "rig.toml",
+            "[[faces]]\nrig = \"range.toml\"\n",
+            &["line 2, column 7", "`faces[0].rig`", "not a rig file"],
+        ),
+        ("broken.toml", "fps = = 3\n", &["line 1, column 7"]),
+    ] {
+        case.file(name, content);
+        case.fails(&["scene", "check", name], 1, parts);
+        case.fails(&["animate", "--scene", name, "-o", "out.mcap"], 1, parts);
+    }
+    case.fails(
+        &["scene", "check", "none.toml"],
+        1,
+        &["cannot read none.toml"],
+    );
+    case.fails(&["animate", "-o", "out.mcap"], 2, &["--motion"]);
+}
+
+#[test]
 fn takes() {
     let case = Case::new();
     for (name, content, parts) in [

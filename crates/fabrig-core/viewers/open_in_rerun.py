@@ -23,11 +23,14 @@ from mcap.reader import make_reader
 from rerun.blueprint.encodings import VisualizerComponentMapping
 
 WORLD = "world"
-HEAD = "head"
 SKIN, PARTS, PATCHES = "/rig/skin", "/rig/parts", "/rig/patches"
 STRAIN = "/rig/strain"
 COLLIDERS = "/colliders"
 POINTS = ["/points/skin", "/points/patches"]
+KNOWN = [
+    *(SKIN, PARTS, PATCHES, STRAIN, COLLIDERS, *POINTS),
+    *("/contacts", "/points/magnets", "/weights", "/stats", "/tf", "/log"),
+]
 SURFACE = ".entities[].triangles[]"
 MESH = {
     "Mesh3D:vertex_positions": f"{SURFACE}.points[] | pack(.x!, .y!, .z!)",
@@ -52,11 +55,29 @@ def mapping(target, component, selector):
     )
 
 
+def face_of(topic):
+    """The face that goes before a topic, as `/ann`; nothing where a recording has one face."""
+    for known in KNOWN:
+        if topic.endswith(known):
+            return topic.removesuffix(known)
+    return ""
+
+
+def head_of(topic):
+    """The frame that a topic's geometry stands in."""
+    return f"{face_of(topic)}/head".strip("/")
+
+
 def mesh_overrides(topic):
     """Draws a scene topic as a mesh that stands in the head's frame."""
     component = "foxglove.SceneUpdate:message"
     maps = [mapping(target, component, selector) for target, selector in MESH.items()]
-    return [rr.Mesh3D.from_fields().visualizer(mappings=maps), rr.CoordinateFrame(HEAD)]
+    return [rr.Mesh3D.from_fields().visualizer(mappings=maps), rr.CoordinateFrame(head_of(topic))]
+
+
+def transforms(topics):
+    """The topics that place the faces of others."""
+    return sorted({f"{face_of(topic)}/tf" for topic in topics})
 
 
 def scene(name, topics):
@@ -64,7 +85,7 @@ def scene(name, topics):
     return rrb.Spatial3DView(
         origin="/",
         name=name,
-        contents=[*topics, "/tf"],
+        contents=[*topics, *transforms(topics)],
         overrides={topic: mesh_overrides(topic) for topic in topics},
         spatial_information=rrb.SpatialInformation(target_frame=WORLD, show_axes=False),
         background=[34, 38, 43],
@@ -87,7 +108,7 @@ def plot(name, topic, component, fields):
 
 
 def read_summary(path):
-    """Topics with messages, and what the weights' and statistics' channels say of their fields."""
+    """Topics with messages, and a function for what a channel says of its fields."""
     with open(path, "rb") as file:
         summary = make_reader(file).get_summary()
     channels = {c.topic: c for c in summary.channels.values()}
@@ -99,7 +120,7 @@ def read_summary(path):
         text = channel.metadata.get(key, "") if channel else ""
         return [name for name in text.split(",") if name]
 
-    return topics, listed("/weights", "plotted"), listed("/stats", "fields")
+    return topics, listed
 
 
 def unit(name):
@@ -109,24 +130,36 @@ def unit(name):
 
 def blueprint(path):
     """The whole arrangement for one recording."""
-    topics, weights, stats = read_summary(path)
+    topics, listed = read_summary(path)
+    faces = sorted({face_of(topic) for topic in topics})
     below = []
-    if weights:
-        below.append(plot("Weights", "/weights", "fabrig.Weights:message", weights))
-    for end, title in UNITS.items():
-        fields = [name for name in stats if unit(name) == end]
-        if fields:
-            below.append(plot(title, "/stats", "fabrig.Stats:message", fields))
-    below.append(rrb.TextLogView(origin="/log", name="Log"))
-    colliders = [COLLIDERS] if COLLIDERS in topics else []
+    for face in faces:
+        of_face = f" {face[1:]}" if face else ""
+        if weights := listed(f"{face}/weights", "plotted"):
+            component = "fabrig.Weights:message"
+            below.append(plot(f"Weights{of_face}", f"{face}/weights", component, weights))
+        stats = listed(f"{face}/stats", "fields")
+        for end, title in UNITS.items():
+            fields = [name for name in stats if unit(name) == end]
+            if fields:
+                component = "fabrig.Stats:message"
+                below.append(plot(f"{title}{of_face}", f"{face}/stats", component, fields))
+    below.append(rrb.TextLogView(origin=f"{faces[0]}/log", name="Log"))
+
+    def of_all(*wanted):
+        return [face + topic for face in faces for topic in wanted]
+
+    colliders = [topic for topic in of_all(COLLIDERS) if topic in topics]
+    strained = [topic for topic in of_all(STRAIN) if topic in topics]
+    points = of_all(*POINTS)
     above = rrb.Horizontal(
-        scene("Skin", [SKIN, PARTS, *colliders]),
-        scene("Muscles and fat", [PATCHES, PARTS, *colliders]),
-        *([scene("Strain", [STRAIN, PARTS])] if STRAIN in topics else []),
+        scene("Skin", [*of_all(SKIN, PARTS), *colliders]),
+        scene("Muscles and fat", [*of_all(PATCHES, PARTS), *colliders]),
+        *([scene("Strain", [*strained, *of_all(PARTS)])] if strained else []),
         rrb.Spatial3DView(
             origin="/",
             name="Points",
-            contents=[*POINTS, "/tf"],
+            contents=[*points, *transforms(points)],
             spatial_information=rrb.SpatialInformation(target_frame=WORLD),
             visible=False,
         ),

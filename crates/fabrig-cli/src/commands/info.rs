@@ -110,18 +110,29 @@ fn clip_facts(clip: &Clip) -> Value {
 }
 
 fn recording_facts(path: &Path) -> Result<Value> {
-    let mut reader = RecordingReader::open(path)?;
-    let metadata = reader.metadata().clone();
+    let mut readers = RecordingReader::open_all(path)?;
+    let metadata = readers.first().map(|reader| reader.metadata().clone());
     let (mut frames, mut seconds) = (0usize, 0.0);
     let mut surfaces = Map::new();
-    while let Some(frame) = reader.next_frame()? {
-        if frames == 0 {
-            for surface in frame.skin.iter().chain(&frame.parts).chain(&frame.patches) {
-                surfaces.insert(surface.info.name.clone(), surface.positions.len().into());
+    for (face, reader) in readers.iter_mut().enumerate() {
+        let name = reader.face().to_owned();
+        let is_first = face == 0;
+        while let Some(frame) = reader.next_frame()? {
+            if is_first && frames == 0 || !is_first {
+                for surface in frame.skin.iter().chain(&frame.parts).chain(&frame.patches) {
+                    let name = match name.as_str() {
+                        "" => surface.info.name.clone(),
+                        face => format!("{face}/{}", surface.info.name),
+                    };
+                    surfaces.insert(name, surface.positions.len().into());
+                }
             }
+            if !is_first {
+                break;
+            }
+            frames += 1;
+            seconds = frame.time_secs;
         }
-        frames += 1;
-        seconds = frame.time_secs;
     }
     Ok(json!({
         "kind": "recording",

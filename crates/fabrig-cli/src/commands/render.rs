@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use fabrig_core::Point;
 use fabrig_core::mesh::io::read_mesh;
 use fabrig_core::pipeline::RigFaceOptions;
-use fabrig_core::recording::RecordingReader;
+use fabrig_core::recording::{RecordedFrame, RecordingReader};
 use fabrig_core::render::{
     Edges, FaceLook, Framing, Image, Layer, Picture, RecordingContent, Sheet, View, mesh_layers,
     recording_layers, write_gif,
@@ -275,18 +275,25 @@ fn render_recording(
         RecordingContent::Face
     };
     let look = FaceLook::default();
-    let mut reader = RecordingReader::open(input)?;
+    let mut readers = RecordingReader::open_all(input)?;
     let wanted = args.time.unwrap_or(0.0);
-    let mut first = None;
+    let mut first: Option<Vec<RecordedFrame>> = None;
     let mut focus = Vec::new();
     let mut images = Vec::new();
     let mut last_subject = None;
-    while let Some(frame) = reader.next_frame()? {
-        let first = first.get_or_insert_with(|| frame.clone());
+    loop {
+        // One of each face, all of one time.
+        let frames = readers.iter_mut().map(RecordingReader::next_frame);
+        let frames: Option<Vec<RecordedFrame>> = frames.collect::<Result<_, _>>()?;
+        let Some(frames) = frames else {
+            break;
+        };
+        let first = first.get_or_insert_with(|| frames.clone());
+        let time = frames.first().map_or(0.0, |frame| frame.time_secs);
         let is_due = if is_gif {
-            frame.time_secs + 1e-6 >= images.len() as f64 / args.fps
+            time + 1e-6 >= images.len() as f64 / args.fps
         } else {
-            frame.time_secs <= wanted + 1e-6
+            time <= wanted + 1e-6
         };
         if !is_due {
             if is_gif {
@@ -294,11 +301,14 @@ fn render_recording(
             }
             break;
         }
-        let layers = recording_layers(&frame, first, content, &look)?;
+        let mut layers = Vec::new();
+        for (frame, first) in frames.iter().zip(first.iter()) {
+            layers.extend(recording_layers(frame, first, content, &look)?);
+        }
         if focus.is_empty() {
             focus = points(&layers);
         }
-        let subject = Subject::plain(&format!("{:.2} s", frame.time_secs), layers);
+        let subject = Subject::plain(&format!("{time:.2} s"), layers);
         if is_gif {
             let mut sheet = Sheet::new();
             for view in views {

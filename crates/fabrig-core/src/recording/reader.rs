@@ -80,6 +80,27 @@ impl RecordingReader {
         Self::start(path.as_ref(), false, Some(face))
     }
 
+    /// A reader for each face of a recording, in their order.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`], but for several faces.
+    pub fn open_all(path: impl AsRef<Path>) -> Result<Vec<Self>, RecordingError> {
+        let path = path.as_ref();
+        match Self::open(path) {
+            Err(RecordingError::SeveralFaces { faces, .. }) => {
+                let names = faces.split(", ");
+                names.map(|face| Self::open_face(path, face)).collect()
+            }
+            other => other.map(|reader| vec![reader]),
+        }
+    }
+
+    /// Name of the face that is read; empty where the recording has one alone.
+    pub fn face(&self) -> &str {
+        &self.face
+    }
+
     /// Opens what a killed recorder left: the end of the file, wherever it is, ends the frames.
     ///
     /// # Errors
