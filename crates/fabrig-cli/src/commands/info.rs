@@ -118,7 +118,7 @@ fn recording_facts(path: &Path) -> Result<Value> {
         let name = reader.face().to_owned();
         let is_first = face == 0;
         while let Some(frame) = reader.next_frame()? {
-            if is_first && frames == 0 || !is_first {
+            if !is_first || frames == 0 {
                 for surface in frame.skin.iter().chain(&frame.parts).chain(&frame.patches) {
                     let name = match name.as_str() {
                         "" => surface.info.name.clone(),
