@@ -10,6 +10,7 @@ use crate::export::LengthUnit;
 use crate::motion::{Adjustment, ReadOptions, TakeFormat};
 use crate::recording::RecordingOptions;
 use crate::registration::{CutSeams, LandmarkOrder};
+use crate::scene::RecordingChoice;
 use crate::transfer::{AlphaMode, OffsetMode};
 
 /// Length of one unit of a mesh or an export.
@@ -251,7 +252,8 @@ pub struct SceneEntry {
     pub file: PathBuf,
     /// Its name in outputs; that of the file when empty, `default` without one.
     pub name: String,
-    /// Frames a second of the simulation; the take's own when not said. (1/s)
+    /// Frames a second of the simulation; the scene file's or else the take's own when not said.
+    /// (1/s)
     pub fps: Option<f64>,
     /// Substeps of the cloth per 1/60 s, before what the file says.
     pub substeps: Option<u32>,
@@ -336,15 +338,16 @@ impl OutputEntry {
         })
     }
 
-    pub(super) fn recording(&self) -> RecordingOptions {
-        let usual = RecordingOptions::default();
-        RecordingOptions {
-            skin_hz: self.skin_hz.unwrap_or(usual.skin_hz),
-            patches_hz: self.patches_hz.unwrap_or(usual.patches_hz),
-            points_hz: self.points_hz.unwrap_or(usual.points_hz),
-            strain_hz: self.strain_hz.unwrap_or(usual.strain_hz),
-            ..usual
-        }
+    /// What is written how often: as it says, or else the scene.
+    pub(super) fn recording(&self, of_scene: &RecordingChoice) -> RecordingOptions {
+        let choice = RecordingChoice {
+            record: of_scene.record.clone(),
+            skin_hz: self.skin_hz.or(of_scene.skin_hz),
+            patches_hz: self.patches_hz.or(of_scene.patches_hz),
+            points_hz: self.points_hz.or(of_scene.points_hz),
+            strain_hz: self.strain_hz.or(of_scene.strain_hz),
+        };
+        choice.options()
     }
 
     /// What of it matters for one file.

@@ -18,6 +18,7 @@ use super::pattern::{Names, fill, has};
 use super::plan::{PlannedJob, Standing};
 use super::record::record_path;
 use crate::edit::edits_path;
+use crate::scene::Scene;
 
 /// What a planner comes to.
 pub(super) struct Planned {
@@ -64,7 +65,10 @@ impl<'a> Planner<'a> {
         }
         paths.extend(manifest.takes.iter().map(|take| take.file.clone()));
         let scenes = manifest.scenes.iter().filter(|scene| scene.has_file());
-        paths.extend(scenes.map(|scene| scene.file.clone()));
+        for scene in scenes {
+            paths.extend(maps_of(&scene.file));
+            paths.insert(scene.file.clone());
+        }
         let digests = paths.into_par_iter().map(|path| {
             let digest =
                 digest_input(&path).map_err(|e| format!("cannot read {}: {e}", path.display()));
@@ -335,6 +339,11 @@ impl<'a> Planner<'a> {
         if let Some(scene) = scene {
             key = key.with_settings("scene settings", &scene.settings());
             if scene.has_file() {
+                for map in maps_of(&scene.file) {
+                    // What is wrong with a map the job says itself.
+                    let digest = self.digest(&map).unwrap_or_default();
+                    key = key.with("wrinkle map", &digest);
+                }
                 match self.digest(&scene.file) {
                     Ok(digest) => key = key.with("scene file", &digest),
                     Err(message) => {
@@ -412,4 +421,15 @@ fn slashes(path: &Path) -> String {
         .components()
         .map(|part| part.as_os_str().to_string_lossy());
     parts.collect::<Vec<_>>().join("/")
+}
+
+/// The wrinkle maps that a scene file names; none of one that cannot be read.
+fn maps_of(scene: &Path) -> Vec<PathBuf> {
+    Scene::load(scene).map_or_else(
+        |_| Vec::new(),
+        |scene| {
+            let maps = scene.wrinkles.values().map(|edit| &edit.map);
+            maps.map(|map| scene.path_of(map)).collect()
+        },
+    )
 }

@@ -230,10 +230,10 @@ impl AtWork<'_> {
         let task = &self.job.task;
         let output = task.output.clone().unwrap_or_default();
         let options = AnimateOptions {
-            fps: task.scene.as_ref().and_then(|scene| scene.fps),
+            fps: scene.fps,
             rig_name: task.face.name.clone(),
             take_name: self.take_name(),
-            recording: output.recording(),
+            recording: output.recording(&scene.recording),
         };
         let report = animate(rig, clip, scene, path, &options, &mut |now| {
             progress(now.frame as f64 / now.frame_count as f64)
@@ -254,7 +254,7 @@ impl AtWork<'_> {
         let rig = self.load_rig()?;
         let task = &self.job.task;
         let output = task.output.clone().unwrap_or_default();
-        let usual = ExportOptions::default();
+        let (usual, scene) = (ExportOptions::default(), self.scene()?);
         let options = ExportOptions {
             name: task.face.name.clone(),
             unit: output.unit.map(Into::into),
@@ -269,10 +269,10 @@ impl AtWork<'_> {
             },
             motion_name: self.take_name(),
             baked: output.baked,
-            fps: task.scene.as_ref().and_then(|scene| scene.fps),
+            fps: scene.fps,
             still_head: output.still_head,
             basis_tolerance: output.tolerance.unwrap_or(usual.basis_tolerance),
-            scene: self.scene()?,
+            scene,
             check_sum: output.check,
             ..usual
         };
@@ -303,7 +303,7 @@ impl AtWork<'_> {
             take: &self.take_name(),
             scene: task.scene.as_ref().map_or("", |scene| &scene.name),
         };
-        let fps = task.scene.as_ref().and_then(|scene| scene.fps);
+        let fps = scene.fps;
         let report = dataset::write_pair(path, rig, clip, scene, fps, names, progress);
         let report = match report {
             Err(dataset::PairError::Stopped) => return Err(Break::Stopped),
@@ -404,6 +404,7 @@ pub(super) fn read_scene(entry: &SceneEntry) -> Result<Scene, Failure> {
             return Err(fail(&SceneError::HasFaces { count }));
         }
     }
+    scene.fps = entry.fps.or(scene.fps);
     if let Some(substeps) = entry.substeps {
         scene.cloth.substeps = substeps;
     }

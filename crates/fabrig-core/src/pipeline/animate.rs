@@ -20,7 +20,8 @@ use crate::scene::{FrameReport, Scene, Simulation};
 /// How a take is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnimateOptions {
-    /// Frames a second of the simulation; [`recording_rate`] of the take when `None`. (1/s)
+    /// Frames a second of the simulation; the scene's, or else [`recording_rate`] of the take,
+    /// when `None`. (1/s)
     pub fps: Option<f64>,
     /// Name of the rig in the recording.
     pub rig_name: String,
@@ -120,7 +121,8 @@ pub fn animate(
     progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
 ) -> Result<AnimateReport, Error> {
     let wall = Instant::now();
-    let fps = options.fps.unwrap_or_else(|| recording_rate(&clip));
+    let asked = options.fps.or(scene.fps);
+    let fps = asked.unwrap_or_else(|| recording_rate(&clip));
     let maker = FrameMaker::new(&rig, options.recording);
     let info = maker.info(&rig, Some(&clip), &scene, fps, options)?;
     let foxglove_layout = foxglove_layout(&[&info], &options.recording);

@@ -44,7 +44,7 @@ impl LiveFace {
         options: &AnimateOptions,
     ) -> Result<Self, Error> {
         let own = clip.as_ref().map_or(RATE_WITHOUT_TAKE, recording_rate);
-        let fps = options.fps.unwrap_or(own);
+        let fps = options.fps.or(scene.fps).unwrap_or(own);
         let mut maker = FrameMaker::new(&rig, options.recording);
         let info = maker.info(&rig, clip.as_ref(), &scene, fps, options)?;
         let encoder = FrameEncoder::new(info, options.recording)?;

@@ -569,7 +569,7 @@ const FORCE: &[Key] = &[
         "strength",
         Kind::OverTime(&from_to(-1e9, 1e9)),
         "acceleration at the centre (mm/s^2), negative pulls; or keys over time",
-        "20000",
+        "8000",
     ),
     Key::required(
         "reach",
