@@ -13,6 +13,7 @@ use std::sync::LazyLock;
 use assert_cmd::Command;
 use fabrig_core::pipeline::{RigFaceOptions, rig_face};
 use fabrig_core::recording::RecordingReader;
+use fabrig_core::scene::Scene;
 use fabrig_core::template::{demo_face, human};
 use serde_json::Value;
 
@@ -94,6 +95,21 @@ fn the_examples_are_modelled_and_recorded() {
     assert_eq!(code, Some(0), "{errors}");
     let facts = json(folder, &["info", "two.mcap", "--json"]);
     assert_eq!(facts["vertices_of_surfaces"]["bob/skin"], 13_082);
+}
+
+#[test]
+fn what_the_documents_show_of_scenes_is_read() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    let mut count = 0;
+    for page in ["scenes.md", "formats.md"] {
+        let text = std::fs::read_to_string(docs.join(page)).unwrap();
+        for block in text.split("```toml\n").skip(1) {
+            let block = block.split("```").next().unwrap();
+            Scene::from_toml(block).unwrap_or_else(|error| panic!("{page}: {error}\n{block}"));
+            count += 1;
+        }
+    }
+    assert!(count > 5, "{count}");
 }
 
 #[test]

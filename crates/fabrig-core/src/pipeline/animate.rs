@@ -129,7 +129,8 @@ pub fn animate(
     // Opened first: it refuses a bad frame rate or folder before anything is computed.
     let mut recorder = McapRecorder::create(output, info, options.recording)?;
     let take = clip.notes().clone();
-    let frame_count = (clip.duration() * fps + 1e-6).floor() as u64 + 1;
+    let duration = scene.duration.unwrap_or_else(|| clip.duration());
+    let frame_count = (duration * fps + 1e-6).floor() as u64 + 1;
     let run = Simulation::new(rig, scene, Some(clip))
         .map_err(Error::from)
         .and_then(|simulation| {

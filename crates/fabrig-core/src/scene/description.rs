@@ -81,8 +81,7 @@ pub struct Scene {
     pub wrinkles: BTreeMap<String, WrinkleEdit>,
     /// Frames a second of the simulation; the take's own when not said. (1/s)
     pub fps: Option<f64>,
-    /// Duration of a scene with [`faces`](Self::faces); until the last take ends when not said.
-    /// (s)
+    /// How long is simulated; until the last take ends when not said. (s)
     pub duration: Option<f64>,
     /// What is recorded.
     pub recording: RecordingChoice,

@@ -59,6 +59,27 @@ fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, Sc
             .check(index)
             .map_err(|error| source.at(&format!("colliders[{index}]"), error))?;
     }
+    if !scene.faces.is_empty() && scene.place != super::Placement::default() {
+        return Err(source.value(
+            "place",
+            "`position` and `turn` in each of the `faces`".to_owned(),
+            "a place for all of them".to_owned(),
+            None,
+        ));
+    }
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    for (index, face) in scene.faces.iter().enumerate() {
+        let name = face.display_name();
+        if scene.faces.len() > 1 && !(name.chars().all(is_plain) && !name.is_empty()) {
+            return Err(source.value(
+                &format!("faces[{index}].name"),
+                "letters from a to z, digits and any of _ - . alone, as it goes into topics"
+                    .to_owned(),
+                format!("'{name}'"),
+                None,
+            ));
+        }
+    }
     let names = |list: &str, names: Vec<String>| {
         for (index, name) in names.iter().enumerate() {
             if let Some(first) = names[..index].iter().position(|other| other == name) {

@@ -189,7 +189,7 @@ pub(super) const SCENE: &[Key] = &[
     Key::optional(
         "duration",
         positive(1e6),
-        "of a scene with faces (s); until the last take ends where left out",
+        "how long is simulated (s); until the (last) take ends where left out",
         "2.5",
     ),
     Key::new(

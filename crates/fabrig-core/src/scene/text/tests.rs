@@ -239,7 +239,17 @@ fn said(text: &str) -> (TextPlace, String) {
 
 #[test]
 fn what_is_wrong_is_told_with_place_key_expectation_and_nearest_name() {
-    let cases: [(&str, [usize; 2], &[&str]); 17] = [
+    let cases: [(&str, [usize; 2], &[&str]); 19] = [
+        (
+            "[place]\nposition = [0, 0, 1]\n[[faces]]\nrig = \"a.fabrig\"",
+            [1, 1],
+            &["`place`", "in each of the `faces`"],
+        ),
+        (
+            "[[faces]]\nrig = \"a.fabrig\"\n[[faces]]\nrig = \"b c.fabrig\"",
+            [3, 1],
+            &["`faces[1].name`", "found 'b c'"],
+        ),
         (
             "gravty = [0, 0, 0]",
             [1, 1],
