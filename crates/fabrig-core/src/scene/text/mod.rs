@@ -70,7 +70,8 @@ fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, Sc
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
     for (index, face) in scene.faces.iter().enumerate() {
         let name = face.display_name();
-        if scene.faces.len() > 1 && !(name.chars().all(is_plain) && !name.is_empty()) {
+        let is_unfit = name.is_empty() || !name.chars().all(is_plain);
+        if scene.faces.len() > 1 && is_unfit {
             return Err(source.value(
                 &format!("faces[{index}].name"),
                 "letters from a to z, digits and any of _ - . alone, as it goes into topics"
