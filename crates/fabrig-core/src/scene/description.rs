@@ -39,7 +39,7 @@ pub enum EyeSource {
 
 /// What to model around a rig and its motion.
 ///
-/// Every field is a key of the text, with its meaning and range in `text/schema.rs`.
+/// Every field is a key of the text, with its meaning and range in `text/schema/`.
 ///
 /// Times are on the scene's axis: seconds from the start of the scene where it has
 /// [`faces`](Self::faces), the take's own time where rig and take are given by the caller.
