@@ -52,6 +52,9 @@ const RIGID_ROUNDS: usize = 14;
 const ELSEWHERE_MM: f64 = 0.8;
 /// Further off than this it is of another face. (mm)
 const OTHER_FACE_MM: f64 = 1.5;
+/// And so it is where a tenth of the face is further off than this: another face can be laid so
+/// that half of it fits. (mm)
+const OTHER_FACE_FAR_MM: f64 = 6.0;
 /// A scan further off than this in the median once it is deformed to is another face. (mm)
 const MOST_RESIDUAL_MM: f64 = 1.0;
 /// A registered place this far from the scan is none that it shows. (mm)
@@ -135,7 +138,8 @@ pub fn register_expression(
         }
     }
     let residual = placed.residual();
-    let Some(placed) = placed.0.filter(|_| residual <= OTHER_FACE_MM) else {
+    let is_face = |p: &Placed| residual <= OTHER_FACE_MM && p.far <= OTHER_FACE_FAR_MM;
+    let Some(placed) = placed.0.filter(is_face) else {
         return Err(RegistrationError::OtherFace {
             distance_mm: residual,
         });
@@ -214,6 +218,8 @@ struct Placed {
     amplitude: f64,
     /// Median distance. (mm)
     residual: f64,
+    /// Distance that a tenth of the face exceeds. (mm)
+    far: f64,
 }
 
 /// A scan that may not have been found.
@@ -255,19 +261,19 @@ impl<'a> Start<'a> {
         scan: &CleanMesh,
         to_head: &Similarity3<f64>,
     ) -> Result<MaybePlaced, RegistrationError> {
-        let mut best: Option<(f64, usize, Pose)> = None;
+        let mut best: Option<([f64; 2], usize, Pose)> = None;
         for piece in 0..scan.pieces.len().min(3) {
             if scan.pieces[piece].area < 0.2 * scan.pieces[0].area {
                 break;
             }
             let target = target_of(scan, piece, to_head)?;
             let pose = self.settle(&target);
-            let residual = self.residual(&target, &pose);
-            if best.as_ref().is_none_or(|b| residual < b.0) {
-                best = Some((residual, piece, pose));
+            let distances = self.distances(&target, &pose);
+            if best.as_ref().is_none_or(|b| distances[0] < b.0[0]) {
+                best = Some((distances, piece, pose));
             }
         }
-        let Some((residual, piece, pose)) = best.filter(|b| b.0.is_finite()) else {
+        let Some(([residual, far], piece, pose)) = best.filter(|b| b.0[0].is_finite()) else {
             return Ok(MaybePlaced(None));
         };
         let to_head = pose.motion.inverse() * to_head;
@@ -276,6 +282,7 @@ impl<'a> Start<'a> {
             positions: self.at(pose.amplitude),
             amplitude: pose.amplitude,
             residual,
+            far,
         })))
     }
 
@@ -349,10 +356,10 @@ impl<'a> Start<'a> {
         })
     }
 
-    /// Median distance of the face from the scan. (mm)
-    fn residual(&self, target: &Target, pose: &Pose) -> f64 {
+    /// Distances of the face from the scan: the median, and what a tenth exceeds. (mm)
+    fn distances(&self, target: &Target, pose: &Pose) -> [f64; 2] {
         let positions = self.at(pose.amplitude);
-        let distances: Vec<f64> = self
+        let mut distances: Vec<f64> = self
             .vertices
             .par_iter()
             .map(|&v| {
@@ -362,7 +369,9 @@ impl<'a> Start<'a> {
                     .distance
             })
             .collect();
-        DistanceStatistics::from_distances(distances).median
+        distances.sort_by(f64::total_cmp);
+        let at = |tenths: usize| distances.get(distances.len() * tenths / 10);
+        [5, 9].map(|tenths| at(tenths).copied().unwrap_or(f64::INFINITY))
     }
 }
 
