@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+#[cfg(feature = "play")]
 use fabrig_core::recording::RecordingOptions;
 
 use super::animate::{Recorded, parse_rate};
@@ -50,6 +51,7 @@ pub(crate) struct PlayArgs {
 
 impl PlayArgs {
     /// What is sent how often.
+    #[cfg(feature = "play")]
     pub(crate) fn options(&self) -> RecordingOptions {
         let options = RecordingOptions {
             skin_hz: self.mesh_hz,
