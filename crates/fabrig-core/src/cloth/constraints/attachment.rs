@@ -42,18 +42,21 @@ pub(crate) fn pair_share(a: &PairEnd, b: &PairEnd, compliance: f64) -> f64 {
     a.inv_mass / (a.inv_mass * a.pair_count + b.inv_mass * b.pair_count + compliance)
 }
 
+/// A vector of an end of a pair; the fourth component fills a register and is 0. (mm)
+pub(crate) type PairVector = [f64; 4];
+
 /// A sum of corrections that does not depend on their order.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct OrderFreeSum {
-    sum: [f64; 3],
+    sum: PairVector,
 }
 
 impl OrderFreeSum {
     /// Takes in the correction of `own` by its pair with `other`, which goes `share` of the
     /// way. (mm)
     #[inline(always)]
-    pub(crate) fn add(&mut self, own: [f64; 3], other: [f64; 3], share: f64) {
-        for axis in 0..3 {
+    pub(crate) fn add(&mut self, own: &PairVector, other: &PairVector, share: f64) {
+        for axis in 0..4 {
             let gap = other[axis] - own[axis];
             // What is no number counts as far away.
             let gap = if -LARGEST < gap { gap } else { -LARGEST };
@@ -63,10 +66,10 @@ impl OrderFreeSum {
         }
     }
 
-    /// The sum. (mm)
+    /// The sum, added to `own`. (mm)
     #[inline(always)]
-    pub(crate) fn total(&self) -> [f64; 3] {
-        self.sum
+    pub(crate) fn from(&self, own: &PairVector) -> PairVector {
+        std::array::from_fn(|axis| own[axis] + self.sum[axis])
     }
 }
 
@@ -113,10 +116,11 @@ mod tests {
         let sum = |order: [usize; 3], sign: f64| {
             let mut m = OrderFreeSum::default();
             for i in order {
-                let own = [0.01 * sign, 0.02, 0.03];
-                m.add(own, [terms[i][0] * sign, terms[i][1], terms[i][2]], 0.3);
+                let own = [0.01 * sign, 0.02, 0.03, 0.0];
+                let other = [terms[i][0] * sign, terms[i][1], terms[i][2], 0.0];
+                m.add(&own, &other, 0.3);
             }
-            m.total()
+            m.from(&[0.0; 4])
         };
         let one = sum([0, 1, 2], 1.0);
         assert_eq!(one, sum([2, 0, 1], 1.0));

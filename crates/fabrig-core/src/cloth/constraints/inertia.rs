@@ -41,11 +41,20 @@ impl<R: Real> FrameForces<R> {
             twice: Vec3::splat(w.map(|x| 2.0 * x)),
         }
     }
+
+    /// The same for positions relative to `center` (mm).
+    pub(crate) fn about(self, center: Vec3<R>) -> Self {
+        Self {
+            uniform: frame_acceleration(&self, center, Vec3::zero()),
+            ..self
+        }
+    }
 }
 
 /// Acceleration of one node in the head frame. (mm/s^2)
 ///
-/// - `r`: position (mm), `v`: velocity (mm/s), both in the head frame
+/// - `r`: position (mm) in the head frame, or relative to the centre that the forces are about
+/// - `v`: velocity in the head frame (mm/s)
 #[inline(always)]
 pub(crate) fn frame_acceleration<R: Real>(
     forces: &FrameForces<R>,

@@ -69,7 +69,7 @@ impl<R: Real> PatchGroup for Group<R> {
     }
 
     fn solve(&mut self, substep: &Substep, ports: &[Ports]) {
-        self.solve_pairs(ports);
+        vectorized(SolvePairs(self, ports));
         let sweeps = self.sweeps;
         let robust_count = (self.lane_states.iter())
             .filter(|s| s.robust_frames > 0)
@@ -245,6 +245,7 @@ vectorized_work!(
 );
 vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
 vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
+vectorized_work!(SolvePairs<&'a [Ports]> -> (), |group, ports| group.solve_pairs(ports));
 vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
 vectorized_work!(
     Sweep<(&'a Substep, u32)> -> (),

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::cloth::constraints::attachment::PairEnd;
+use crate::cloth::constraints::attachment::{PairEnd, PairVector};
 use crate::cloth::input::PatchMotion;
 use crate::cloth::report::Energies;
 
@@ -50,7 +50,7 @@ pub(crate) struct Partner {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ports {
     /// Predicted displacement of each from its target. (mm)
-    pub(crate) displacements: Vec<[f64; 3]>,
+    pub(crate) displacements: Vec<PairVector>,
     /// What each brings into its pairs.
     pub(crate) ends: Vec<PairEnd>,
     /// How often the masses have changed; for these [`Ports::ends`] hold.

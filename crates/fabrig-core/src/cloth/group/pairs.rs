@@ -2,7 +2,7 @@
 
 use super::interface::{GroupPairs, Ports};
 use super::state::Group;
-use crate::cloth::constraints::attachment::{OrderFreeSum, PairEnd, pair_share};
+use crate::cloth::constraints::attachment::{OrderFreeSum, PairEnd, PairVector, pair_share};
 use crate::cloth::lanes::Real;
 
 /// The pairs of a group, made ready for substeps: one row of partners after the other.
@@ -20,6 +20,8 @@ pub(super) struct PairTable {
     stiffnesses: Vec<f64>,
     /// Share of the distance that the own node goes for each partner.
     shares: Vec<f64>,
+    /// Where each node is moved to. (mm)
+    moved: Vec<PairVector>,
     /// Versions of all groups' masses that the shares are for, summed.
     version: Option<u64>,
 }
@@ -28,6 +30,7 @@ impl PairTable {
     pub(super) fn new(group: usize, pairs: &GroupPairs) -> Self {
         let mut out = Self {
             group,
+            moved: vec![PairVector::default(); pairs.nodes.len()],
             nodes: pairs.nodes.clone(),
             starts: vec![0],
             ..Self::default()
@@ -50,6 +53,7 @@ impl PairTable {
 }
 
 impl<R: Real> Group<R> {
+    #[inline(always)]
     pub(super) fn write_ports(&self, ports: &mut Ports) {
         let pairs = &self.pairs;
         ports.displacements.clear();
@@ -57,7 +61,8 @@ impl<R: Real> Group<R> {
             .displacements
             .extend(pairs.nodes.iter().map(|&(node, lane)| {
                 let x = &self.solution[node as usize];
-                x.lane(lane as usize)
+                let [x, y, z] = x.lane(lane as usize);
+                [x, y, z, 0.0]
             }));
         if ports.version != self.masses_version || ports.ends.len() != pairs.nodes.len() {
             ports.version = self.masses_version;
@@ -72,6 +77,7 @@ impl<R: Real> Group<R> {
     }
 
     /// Projects all pairs of the group's nodes from what `ports` say, its own among them.
+    #[inline(always)]
     pub(super) fn solve_pairs(&mut self, ports: &[Ports]) {
         if self.pairs.nodes.is_empty() {
             return;
@@ -81,25 +87,30 @@ impl<R: Real> Group<R> {
             self.pairs.version = Some(version);
             self.refresh_shares(ports);
         }
-        let pairs = &self.pairs;
+        let pairs = &mut self.pairs;
         // From the ports too: they lie side by side, the nodes do not.
         let owns = &ports[pairs.group].displacements;
-        for (k, (&(node, lane), &own)) in pairs.nodes.iter().zip(owns).enumerate() {
+        let rows = pairs.starts.iter().zip(&pairs.starts[1..]);
+        // All four components are stored, so that they stay in one register.
+        for ((moved, own), (&first, &end)) in pairs.moved.iter_mut().zip(owns).zip(rows) {
+            let row = first as usize..end as usize;
             let mut sum = OrderFreeSum::default();
-            let row = pairs.row(k);
             for (&(group, port), &share) in
                 pairs.partners[row.clone()].iter().zip(&pairs.shares[row])
             {
-                let other = ports[group as usize].displacements[port as usize];
+                let other = &ports[group as usize].displacements[port as usize];
                 sum.add(own, other, share);
             }
-            let total = sum.total();
-            let moved = [0, 1, 2].map(|axis| own[axis] + total[axis]);
-            self.solution[node as usize].set_lane(lane as usize, moved);
+            *moved = sum.from(own);
+        }
+        for (&(node, lane), moved) in pairs.nodes.iter().zip(&pairs.moved) {
+            let [x, y, z, _] = *moved;
+            self.solution[node as usize].set_lane(lane as usize, [x, y, z]);
         }
     }
 
     /// Shares change only with the masses, so hardly ever within a frame.
+    #[inline(never)]
     fn refresh_shares(&mut self, ports: &[Ports]) {
         let pairs = &mut self.pairs;
         pairs.shares.clear();

@@ -48,18 +48,20 @@ impl<R: Real> Clamp<R> {
     /// `step` of a displacement, held to half an edge, measured against the head or against the
     /// target that moves by `target_step`, whichever is less: a cloth that follows its target
     /// and one that ignores it both move as they should. (mm)
+    ///
+    /// How the target moves is asked only where it matters, which is hardly ever.
     #[inline(always)]
-    fn held(&mut self, step: Vec3<R>, target_step: Vec3<R>) -> Vec3<R> {
+    fn held(&mut self, step: Vec3<R>, target_step: impl FnOnce() -> Vec3<R>) -> Vec3<R> {
         let limit = self.limit;
-        let moved = step + target_step;
-        let (relative, absolute) = (step.dot(step), moved.dot(moved));
-        let squared = R::select_less(relative, absolute, relative, absolute);
-        if R::any_less(limit, squared) {
-            self.count += R::select_less(limit, squared, R::splat(1.0), R::splat(0.0));
-            step * (limit / squared.max(limit)).sqrt()
-        } else {
-            step
+        let relative = step.dot(step);
+        if !R::any_less(limit, relative) {
+            return step;
         }
+        let moved = step + target_step();
+        let absolute = moved.dot(moved);
+        let squared = R::select_less(relative, absolute, relative, absolute);
+        self.count += R::select_less(limit, squared, R::splat(1.0), R::splat(0.0));
+        step * (limit / squared.max(limit)).sqrt()
     }
 }
 
@@ -73,11 +75,12 @@ struct Prediction<R> {
     follow: R,
     /// What an anchor's stiffness counts with. [s^2]
     anchored: R,
-    /// Hermite weights of the target, of its step now, and of its step before, where that was
-    /// in the same frame.
+    /// Hermite weights of the target, of its step now, of its step before where that was in the
+    /// same frame, and of u_b - x_b: the step less what history takes of the one before.
     target: [R; 3],
     step: [R; 3],
     last_step: [R; 3],
+    drift: [R; 3],
 }
 
 /// Acceleration of the nodes. (mm/s^2)
@@ -89,8 +92,8 @@ trait Field<R> {
 /// The same for all nodes.
 struct Uniform<R>(Vec3<R>);
 
-/// Of a turning head; the second is the centre of the patches. (mm)
-struct Turning<R>(FrameForces<R>, Vec3<R>);
+/// Of a turning head, about the centre of the patches.
+struct Turning<R>(FrameForces<R>);
 
 /// Of a turning head in wind, whose share was evaluated beforehand.
 struct Windy<'a, R>(Turning<R>, &'a [Vec3<R>]);
@@ -105,7 +108,7 @@ impl<R: Real> Field<R> for Uniform<R> {
 impl<R: Real> Field<R> for Turning<R> {
     #[inline(always)]
     fn at(&self, _: usize, x: Vec3<R>, v: Vec3<R>) -> Vec3<R> {
-        frame_acceleration(&self.0, self.1 + x, v)
+        frame_acceleration(&self.0, x, v)
     }
 }
 
@@ -176,6 +179,7 @@ impl<R: Real> Group<R> {
         };
         let after = self.weights[1];
         let is_folded = if self.mode == Mode::Paper { 0.0 } else { 1.0 };
+        let (step, last_step) = (difference(self.weights), difference(last));
         Prediction {
             history,
             h_e,
@@ -183,8 +187,9 @@ impl<R: Real> Group<R> {
             anchored: h_e * h_e * R::splat(is_folded),
             follow: self.magnet.past_mass(self.mass, h_e),
             target: [R::splat(after[0]), R::splat(after[1]), R::splat(after[2])],
-            step: difference(self.weights),
-            last_step: difference(last),
+            step,
+            last_step,
+            drift: std::array::from_fn(|k| step[k] - last_step[k] * history),
         }
     }
 
@@ -227,7 +232,7 @@ impl<R: Real> Group<R> {
         for i in 0..self.solution.len() {
             let target_step = self.segments().weighted(i, weights);
             let (u, v) = (self.displacements[i], self.velocities[i]);
-            let now = u + clamp.held(self.solution[i] - self.targets[i] - u, target_step);
+            let now = u + clamp.held(self.solution[i] - self.targets[i] - u, || target_step);
             self.target_steps[i] = target_step;
             self.displacements[i] = now;
             self.previous_displacements[i] = u;
@@ -273,14 +278,14 @@ impl<R: Real> Group<R> {
             if let Some(horizon) = substep.wind_horizon {
                 self.evaluate_wind(substep, horizon);
             }
-            let turning = Turning(FrameForces::new(substep.uniform, w, dw), self.origin);
+            let turning = Turning(FrameForces::new(substep.uniform, w, dw).about(self.origin));
             let wind = std::mem::take(&mut self.wind_accelerations);
             let sum = self.predict_in::<IS_TURN, _>(&Windy(turning, &wind), p);
             self.wind_accelerations = wind;
             sum
         } else if [w, dw] != [[0.0; 3]; 2] {
-            let forces = FrameForces::new(substep.uniform, w, dw);
-            self.predict_in::<IS_TURN, _>(&Turning(forces, self.origin), p)
+            let forces = FrameForces::new(substep.uniform, w, dw).about(self.origin);
+            self.predict_in::<IS_TURN, _>(&Turning(forces), p)
         } else {
             self.predict_in::<IS_TURN, _>(&Uniform(Vec3::splat(substep.uniform)), p)
         };
@@ -316,11 +321,13 @@ impl<R: Real> Group<R> {
         };
         let mut squared = R::splat(0.0);
         for i in 0..n {
-            let (m, last_step);
+            // How far the target moves more than it did, of which history takes its share.
+            let (m, drift);
             if IS_TURN {
-                last_step = segments.weighted(i, p.last_step);
                 let (u, v) = (us[i], vs[i]);
-                let moved = clamp.held(solution[i] - targets[i] - u, last_step);
+                let moved = clamp.held(solution[i] - targets[i] - u, || {
+                    segments.weighted(i, p.last_step)
+                });
                 let now = u + moved;
                 m = NodeMotion {
                     u: now,
@@ -330,23 +337,21 @@ impl<R: Real> Group<R> {
                 };
                 us[i] = m.u;
                 vs[i] = m.v;
+                drift = segments.weighted(i, p.drift);
             } else {
-                last_step = target_steps[i];
                 m = NodeMotion {
                     u: us[i],
                     previous_u: previous_us[i],
                     v: vs[i],
                     previous_v: previous_vs[i],
                 };
+                drift = segments.weighted(i, p.step) - target_steps[i] * p.history;
             }
             let target = starts[i] + segments.weighted(i, p.target);
-            let step = segments.weighted(i, p.step);
-            // As u + r (u - u'): weights that are rounded to a sum other than 1 would be a force.
+            // As u + g (u - u'): weights that are rounded to a sum other than 1 would be a force.
             let change = m.u - m.previous_u;
             let ub = m.u + change * p.history;
-            let now = m.u - step;
-            let then = m.previous_u - last_step - step;
-            let xb = now + (now - then) * p.history;
+            let xb = ub - drift;
             let gain = m.v - m.previous_v;
             let vb = m.v + gain * p.history;
             let acceleration = field.at(i, target + m.u + change, m.v + gain);
@@ -355,7 +360,7 @@ impl<R: Real> Group<R> {
             // of the weights' sum then does not act on x_b.
             let coasting = vb * p.h_e + acceleration * h_e2;
             let draw = p.pull + anchors[i] * p.anchored;
-            let top = coasting * self.mass + (ub - xb) * p.follow - xb * draw;
+            let top = coasting * self.mass + drift * p.follow - xb * draw;
             targets[i] = target;
             pasts[i] = xb;
             restings[i] = target + ub;
