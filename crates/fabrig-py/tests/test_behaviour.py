@@ -48,7 +48,9 @@ def test_other_threads_run_while_a_face_is_rigged(face):
 def test_ctrl_c_stops_it(work, rig, tmp_path):
     rig.save(tmp_path / "face.fabrig")
     program = f"""
-        import numpy as np, sys, fabrig
+        import numpy as np, signal, sys, fabrig
+        # What runs in the background of a shell is started deaf to it.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         rig = fabrig.Rig.load("face.fabrig")
         print("ready", flush=True)
         try:
@@ -63,10 +65,13 @@ def test_ctrl_c_stops_it(work, rig, tmp_path):
         stderr=subprocess.PIPE,
         cwd=tmp_path,
     )
-    assert child.stdout.readline() == b"ready\n"
-    time.sleep(0.3)
-    child.send_signal(signal.SIGINT)
-    _, errors = child.communicate(timeout=30)
+    try:
+        assert child.stdout.readline() == b"ready\n"
+        time.sleep(0.3)
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=30)
+    finally:
+        child.kill()
     assert child.returncode == 77, errors.decode()
 
 
