@@ -17,7 +17,7 @@ pub(crate) use animate::{AnimateArgs, ContactPairs, DemoArgs, DemoScene, SceneAr
 pub(crate) use batch::{BatchArgs, BenchBatchArgs, BenchOutput};
 pub(crate) use bench::{
     BenchCommand, BenchParetoArgs, BenchRegistrationArgs, BenchRuntimeArgs, BenchStabilityArgs,
-    BenchTable3Args,
+    BenchTable3Args, BenchWrinklesArgs,
 };
 pub(crate) use export::{ConvertArgs, ExportArgs, LayoutArgs, Target};
 pub(crate) use look::{InfoArgs, RenderArgs, Zoom};

@@ -25,6 +25,10 @@ pub(crate) struct SceneArgs {
     /// Leave the cloth out: patches stand where the muscle shapes want them
     #[arg(long)]
     pub(crate) without_dynamics: bool,
+    /// Skin and fat of the face that are not its own, with commas between: looser_skin,
+    /// firmer_skin, more_fat, less_fat, aged
+    #[arg(long, value_name = "PRESET", value_delimiter = ',')]
+    pub(crate) preset: Vec<String>,
     /// What is modelled, as TOML: `docs/scenes.md`; what else is given here goes before it
     #[arg(long = "scene", value_name = "SCENE.toml")]
     pub(crate) file: Option<PathBuf>,

@@ -29,8 +29,27 @@ pub(crate) enum BenchCommand {
     Runtime(BenchRuntimeArgs),
     /// The cloth solver's hard cases, each with its worst figure
     Stability(BenchStabilityArgs),
+    /// How deep and how finely loose skin wrinkles, on patches and on the skin over them, beside
+    /// what a beam on springs does
+    Wrinkles(BenchWrinklesArgs),
     /// How near rigs come to faces' own expressions, beside whole-face delta transfer
     Table3(BenchTable3Args),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchWrinklesArgs {
+    /// Seeds of the imperfection that decides where skin buckles
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub(crate) seeds: u64,
+    /// Longest edge of the skin over what wrinkles
+    #[arg(long, value_name = "MM", default_value_t = 1.5)]
+    pub(crate) refine_skin: f64,
+    /// Skin that is measured: looser_skin, firmer_skin or aged
+    #[arg(long, value_name = "PRESET", default_value = "looser_skin")]
+    pub(crate) preset: String,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

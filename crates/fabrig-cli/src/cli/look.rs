@@ -18,6 +18,10 @@ pub(crate) enum Zoom {
     Eyes,
     /// The left eye
     Eye,
+    /// Brows to hairline
+    Forehead,
+    /// The outer corner of the left eye
+    EyeCorner,
 }
 
 impl From<Zoom> for Framing {
@@ -28,6 +32,8 @@ impl From<Zoom> for Framing {
             Zoom::Mouth => Self::Mouth,
             Zoom::Eyes => Self::Eyes,
             Zoom::Eye => Self::Eye,
+            Zoom::Forehead => Self::Forehead,
+            Zoom::EyeCorner => Self::EyeCorner,
         }
     }
 }
@@ -85,6 +91,10 @@ pub(crate) struct RenderArgs {
     /// A sheet of every shape of a rig at weight 1, one tile each
     #[arg(long, conflicts_with_all = ["expressions", "pose"])]
     pub(crate) all_shapes: bool,
+    /// Skin and fat of a rig that are not its own, with commas between: looser_skin, firmer_skin,
+    /// more_fat, less_fat, aged
+    #[arg(long, value_name = "PRESET", value_delimiter = ',')]
+    pub(crate) preset: Vec<String>,
     /// What of a rig or the template fills the picture; sheets show the face, anything else all
     #[arg(long, value_enum)]
     pub(crate) zoom: Option<Zoom>,

@@ -89,6 +89,14 @@ pub(crate) struct RigArgs {
     /// How the template's displacements are put on the face [default: the best on other faces]
     #[arg(long, value_enum, value_name = "MODE")]
     pub(crate) offsets: Option<Offsets>,
+    /// Part the mesh over forehead and eyes until its edges are no longer than this, so that it
+    /// can hold wrinkles (1.5 does); what is new follows the mesh's vertices
+    #[arg(long, value_name = "MM", value_parser = clap::value_parser!(f64))]
+    pub(crate) refine_skin: Option<f64>,
+    /// Skin and fat that are not the face's own, with commas between: looser_skin, firmer_skin,
+    /// more_fat, less_fat, aged
+    #[arg(long, value_name = "PRESET", value_delimiter = ',')]
+    pub(crate) preset: Vec<String>,
     /// Also write the mesh that the rig moves: the face with its cuts, in its own units
     #[arg(long, value_name = "OUT.obj")]
     pub(crate) skin: Option<PathBuf>,

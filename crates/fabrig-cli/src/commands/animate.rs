@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
-use fabrig_core::edit::{edits_path, load_edited_rig};
+use fabrig_core::edit::{apply_preset, edits_path, load_edited_rig};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{
     AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate, animate_scene,
@@ -31,7 +31,7 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
              show`)"
         );
     };
-    let rig = load_rig(rig_path)?;
+    let rig = load_rig_for(rig_path, &args.scene)?;
     let clip = read_take(motion, &args.take)?;
     let options = AnimateOptions {
         fps: args.scene.fps.or(scene.fps),
@@ -124,6 +124,21 @@ pub(super) fn load_rig(path: &Path) -> Result<Rig> {
         };
         anyhow::Error::from(error).context(format!("{} cannot be used", culprit.display()))
     })
+}
+
+/// Gives a rig the skin and fat of presets, in their order.
+pub(super) fn apply_presets(rig: &mut Rig, names: &[String]) -> Result<()> {
+    for name in names {
+        apply_preset(rig, name).with_context(|| format!("--preset {name}"))?;
+    }
+    Ok(())
+}
+
+/// Loads a rig with its edits, and then the presets of the arguments.
+pub(super) fn load_rig_for(path: &Path, args: &SceneArgs) -> Result<Rig> {
+    let mut rig = load_rig(path)?;
+    apply_presets(&mut rig, &args.preset)?;
+    Ok(rig)
 }
 
 /// Loads a rig as it was built.

@@ -10,14 +10,14 @@ use fabrig_core::export::{
 };
 use fabrig_core::registration::Progress;
 
-use super::animate::{load_rig, read_take, scene};
+use super::animate::{load_rig_for, read_take, scene};
 use super::{Outcome, check_output, stem};
 use crate::cli::{ExportArgs, LayoutArgs, Unit};
 use crate::console::Console;
 
 pub(crate) fn run(console: &Console, args: &ExportArgs) -> Result<Outcome> {
     check_target(&args.output)?;
-    let rig = Arc::new(load_rig(&args.rig)?);
+    let rig = Arc::new(load_rig_for(&args.rig, &args.scene)?);
     let scene = scene(&args.scene)?;
     let mut options = ExportOptions {
         shapes: if args.scene.without_dynamics {

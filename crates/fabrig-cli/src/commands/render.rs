@@ -14,7 +14,7 @@ use fabrig_core::render::{
 use fabrig_core::rig::Rig;
 use fabrig_core::template::{self, Template};
 
-use super::animate::load_rig;
+use super::animate::{apply_presets, load_rig};
 use super::subjects::{Subject, rig_subjects, template_subjects};
 use super::{Outcome, check_output, rig};
 use crate::cli::{RenderArgs, Zoom};
@@ -44,7 +44,8 @@ pub(crate) fn run(console: &Console, args: &RenderArgs) -> Result<Outcome> {
             args.output.display()
         ),
         ("demo", _) | (_, Some("fabrig")) => {
-            let rig = rig_of(console, input)?;
+            let mut rig = rig_of(console, input)?;
+            apply_presets(&mut rig, &args.preset)?;
             render_rig(console, args, &views, rig)
         }
         ("template", _) => render_template(console, args, &views, template::human()),
@@ -145,7 +146,8 @@ fn render_rigs(console: &Console, args: &RenderArgs, views: &[View]) -> Result<O
             input.display()
         );
         let name = super::stem(input);
-        let rig = rig_of(console, input)?;
+        let mut rig = rig_of(console, input)?;
+        apply_presets(&mut rig, &args.preset)?;
         let mut held = rig_focus(&rig, args)?;
         let own = rig_subjects(console, rig, args)?;
         columns = own.len().max(1);

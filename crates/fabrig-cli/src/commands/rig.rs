@@ -5,8 +5,10 @@ use fabrig_core::mesh::Mesh;
 use fabrig_core::mesh::io::{read_mesh, write_obj};
 use fabrig_core::pipeline::{OwnShapes, RigFaceOptions, RiggedFace, read_own_shapes, rig_face};
 use fabrig_core::registration::{CutSeams, DistanceStatistics, LandmarkOrder, read_landmarks};
+use fabrig_core::rig::SkinRefinement;
 use fabrig_core::template::{Template, human};
 
+use super::animate::apply_presets;
 use super::{Outcome, check_output, report, template_of};
 use crate::cli::{Order, RigArgs, Seam};
 use crate::console::Console;
@@ -41,6 +43,7 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         options.rig.offsets = offsets.into();
     }
     options.rig.alpha = args.alpha.into();
+    options.refinement = args.refine_skin.map(SkinRefinement::to);
     let own = match &args.shapes {
         Some(source) => Some(read_own_shapes(source, &face, &template)?),
         None => None,
@@ -50,8 +53,9 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         options.expressions_on.clone_from(&own.neutral);
         options.scans.clone_from(&own.scans);
     }
-    let rigged = rig_on(console, &face, &template, &options)
+    let mut rigged = rig_on(console, &face, &template, &options)
         .with_context(|| format!("{} was not rigged", args.face.display()))?;
+    apply_presets(&mut rigged.rig, &args.preset)?;
     rigged.rig.save(&args.output)?;
     if let Some(path) = &args.normalized {
         write_obj(path, &rigged.normalized)?;

@@ -1,16 +1,22 @@
 //! Edits on a rig.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::preset::apply_to_depth;
+use super::thickness::thicken;
 use super::{EditError, Edits, MaterialEdit, PatchEdit, ShapeEdit, WrinkleMap, apply_wrinkle_map};
 use crate::Error;
+use crate::anatomy::PatchKind;
 use crate::cloth::Materials;
 use crate::facs::nearest_name;
-use crate::rig::Rig;
+use crate::rig::{Rig, is_called};
 use crate::transfer::PatchTransfer;
 
 /// Amplitudes beyond this are mistyped.
 const ALPHA_LIMITS: [f64; 2] = [0.0, 10.0];
+/// Pads are no thicker or thinner than this against what they were. (mm)
+const THICKNESSES: [f64; 2] = [-10.0, 20.0];
 
 impl Edits {
     /// Applies the edits to a rig as it is built or loaded (not to one that has them already).
@@ -19,17 +25,26 @@ impl Edits {
     ///
     /// [`EditError`] with the name; the rig is then unchanged.
     pub fn apply(&self, rig: &mut Rig) -> Result<(), EditError> {
+        self.apply_at(rig, 0)
+    }
+
+    /// As [`Self::apply`], within `depth` presets.
+    pub(super) fn apply_at(&self, rig: &mut Rig, depth: u32) -> Result<(), EditError> {
         let mut edited = rig.clone();
-        edit_materials(&mut edited, self)?;
-        for (name, edit) in &self.patches {
-            edit_patch(&mut edited, name, edit)?;
+        for name in &self.preset {
+            apply_to_depth(&mut edited, name, depth)?;
         }
+        edit_materials(&mut edited, self)?;
+        edit_patches(&mut edited, &self.patches)?;
         for (name, edit) in &self.shapes {
             edit_shape(&mut edited, name, edit)?;
         }
         for (name, edit) in &self.wrinkles {
-            let map = WrinkleMap::read(&self.folder.join(&edit.map))?;
-            apply_wrinkle_map(&mut edited, name, &map, edit)?;
+            let map = match &edit.map {
+                Some(path) => Some(WrinkleMap::read(&self.folder.join(path))?),
+                None => None,
+            };
+            apply_wrinkle_map(&mut edited, name, map.as_ref(), edit)?;
         }
         *rig = edited;
         Ok(())
@@ -85,17 +100,44 @@ fn in_range(
     })
 }
 
-fn edit_patch(rig: &mut Rig, name: &str, edit: &PatchEdit) -> Result<(), EditError> {
+fn edit_patches(rig: &mut Rig, edits: &BTreeMap<String, PatchEdit>) -> Result<(), EditError> {
+    let mut pads = Vec::new();
+    for (name, edit) in edits {
+        let patches = rig.patches.iter().enumerate();
+        let places: Vec<usize> = patches
+            .filter(|(_, p)| is_called(&p.patch.chart.name, name))
+            .map(|(place, _)| place)
+            .collect();
+        if places.is_empty() {
+            let names = rig.patches.iter().map(|p| p.patch.chart.name.as_str());
+            return Err(EditError::UnknownName {
+                what: "patch",
+                found: name.to_owned(),
+                nearest: nearest_name(name, names).unwrap_or_default().to_owned(),
+            });
+        }
+        for place in places {
+            edit_patch(rig, place, name, edit)?;
+            if let Some(thickness) = edit.thickness {
+                if rig.patches[place].patch.chart.kind != PatchKind::FatPad {
+                    return Err(EditError::NoPad {
+                        name: name.to_owned(),
+                    });
+                }
+                let condition = "from -10 to 20 mm";
+                let thickness = in_range(name, "thickness", thickness, THICKNESSES, condition)?;
+                pads.push((place, thickness));
+            }
+        }
+    }
+    if pads.is_empty() {
+        return Ok(());
+    }
+    thicken(rig, &pads)
+}
+
+fn edit_patch(rig: &mut Rig, place: usize, name: &str, edit: &PatchEdit) -> Result<(), EditError> {
     let materials = Materials::parse(&rig.materials)?;
-    let place = rig.patches.iter().position(|p| p.patch.chart.name == name);
-    let Some(place) = place else {
-        let names = rig.patches.iter().map(|p| p.patch.chart.name.as_str());
-        return Err(EditError::UnknownName {
-            what: "patch",
-            found: name.to_owned(),
-            nearest: nearest_name(name, names).unwrap_or_default().to_owned(),
-        });
-    };
     let patch = &mut rig.patches[place];
     if let Some(alpha) = edit.alpha {
         let alpha = in_range(name, "alpha", alpha, ALPHA_LIMITS, "from 0 to 10")?;

@@ -28,6 +28,22 @@ pub enum EditError {
         /// The most similar one that there is.
         nearest: String,
     },
+    /// There is no such preset.
+    #[error("there is no preset '{found}' (nearest: '{nearest}'); there are: {known}")]
+    UnknownPreset {
+        /// The name.
+        found: String,
+        /// The most similar one that there is.
+        nearest: String,
+        /// All that there are.
+        known: String,
+    },
+    /// Only fat has a thickness.
+    #[error("{name}: only fat pads have a thickness; give its muscle shapes a strength instead")]
+    NoPad {
+        /// The patch.
+        name: String,
+    },
     /// A number is not one that can be used.
     #[error("{name}: {what} is {value}; it must be {condition}")]
     OutOfRange {
@@ -74,6 +90,12 @@ pub enum EditError {
     /// Materials do not come out valid.
     #[error("the edited materials are not valid")]
     Materials(#[from] crate::cloth::MaterialError),
+    /// A patch is no surface that skin could hang on.
+    #[error(transparent)]
+    Surface(#[from] crate::mesh::SurfaceError),
+    /// The skin does not fit the rig.
+    #[error(transparent)]
+    Skin(#[from] crate::skin::SkinError),
     /// A mesh could not be built.
     #[error(transparent)]
     Mesh(#[from] crate::mesh::MeshError),

@@ -6,16 +6,24 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::EditError;
+use super::preset::one_or_many;
 use crate::atomic_file::write_atomically;
 
 /// Edits of a rig, by name.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edits {
+    /// Presets that come first, in this order: one name or a list.
+    #[serde(
+        default,
+        deserialize_with = "one_or_many",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub preset: Vec<String>,
     /// By muscle shape: `zygomaticus_major_l.mouthSmileLeft`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shapes: BTreeMap<String, ShapeEdit>,
-    /// By patch.
+    /// By patch, with or without its side.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub patches: BTreeMap<String, PatchEdit>,
     /// By material.
@@ -55,6 +63,9 @@ pub struct PatchEdit {
     /// Name of its material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
+    /// How much thicker a fat pad is in its middle, and how much fuller the face over it. (mm)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f64>,
 }
 
 /// Where a wrinkle map is, and what it says where it is white.
@@ -62,11 +73,17 @@ pub struct PatchEdit {
 #[serde(deny_unknown_fields)]
 pub struct WrinkleEdit {
     /// A PNG in the mesh's texture coordinates, or a text of one number in [0, 1] per vertex;
-    /// beside the edits unless the path is absolute.
-    pub map: PathBuf,
-    /// Patches that it is for; none named means all.
+    /// beside the edits unless the path is absolute. Without a map, `patches` are white all over,
+    /// but for the lids and lips of rings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<PathBuf>,
+    /// Patches that it is for, with or without their side; none named means all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub patches: Vec<String>,
+    /// Without a map: the part of the way along the fibres that is white, 0 to 1; it fades over a
+    /// tenth of the way to either side. Of a ring, from its inner corner over the upper half.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along: Option<[f64; 2]>,
     /// Factor of the resistances to stretch, compression and shear.
     #[serde(default = "one")]
     pub stretch: f64,
@@ -77,6 +94,10 @@ pub struct WrinkleEdit {
     /// fold.
     #[serde(default)]
     pub rest_blend: f64,
+    /// How far skin over these patches hangs on the one right under it, 0 to 1, instead of on the
+    /// mean of many nodes, which flattens what is finer than they are.
+    #[serde(default = "one")]
+    pub narrow: f64,
 }
 
 fn one() -> f64 {
@@ -106,9 +127,17 @@ impl Edits {
     ///
     /// [`EditError::Syntax`]. Whether names exist shows in [`Self::apply`].
     pub fn parse(text: &str) -> Result<Self, EditError> {
-        toml::from_str(text).map_err(|error| EditError::Syntax {
+        let edits: Self = toml::from_str(text).map_err(|error| EditError::Syntax {
             message: error.to_string().trim().replace('\n', " "),
-        })
+        })?;
+        for (name, edit) in &edits.wrinkles {
+            if edit.map.is_none() && edit.patches.is_empty() {
+                return Err(EditError::Syntax {
+                    message: format!("[wrinkles.{name}] needs a `map`, or `patches` that fold"),
+                });
+            }
+        }
+        Ok(edits)
     }
 
     /// Reads edits from a file.

@@ -13,13 +13,19 @@ use std::path::Path;
 
 use super::{EditError, WrinkleEdit};
 use crate::Point;
+use crate::anatomy::{PatchChart, PatchKind};
 use crate::cloth::NodeVariation;
 use crate::facs::nearest_name;
-use crate::mesh::{Mesh, Surface, SurfacePoint};
-use crate::rig::Rig;
+use crate::mesh::{Mesh, Surface, SurfacePoint, vertex_normals};
+use crate::rig::{RING_SHARE, Rig, is_called};
+use crate::skin::NarrowPatch;
 
 /// Pixels beyond this are no wrinkle map of ours. (bytes)
 const LARGEST_IMAGE: usize = 1 << 30;
+/// Over this share of a ring's way outwards its skin goes from never folding to folding.
+const RING_RISE: f64 = 0.2;
+/// Share of the fibres' way over which white fades.
+const ALONG_FADE: f64 = 0.1;
 
 /// A wrinkle map of one mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,7 +120,9 @@ impl WrinkleMap {
     }
 }
 
-/// Gives the nodes of a rig the word of a wrinkle map.
+/// Gives the nodes of a rig the word of a wrinkle map, and lets the skin over them show it.
+///
+/// - `map`: none means white wherever the patches of `edit` can fold
 ///
 /// # Errors
 ///
@@ -123,52 +131,118 @@ impl WrinkleMap {
 pub fn apply_wrinkle_map(
     rig: &mut Rig,
     name: &str,
-    map: &WrinkleMap,
+    map: Option<&WrinkleMap>,
     edit: &WrinkleEdit,
 ) -> Result<(), EditError> {
     check_factors(name, edit)?;
     check_patches(rig, edit)?;
     let problem = |problem| EditError::WrinkleMap {
-        path: edit.map.clone(),
+        path: edit.map.clone().unwrap_or_default(),
         problem,
     };
-    map.check(&rig.face).map_err(problem)?;
-    let skin = Skin::of(rig).map_err(problem)?;
+    let painted = match map {
+        None => None,
+        Some(map) => {
+            map.check(&rig.face).map_err(problem)?;
+            Some((map, Skin::of(rig).map_err(problem)?))
+        }
+    };
     let factors = [edit.stretch, edit.bend, edit.rest_blend].map(|f| f as f32);
     rig.variations.resize(rig.patches.len(), Vec::new());
-    for (patch, variations) in rig.patches.iter().zip(&mut rig.variations) {
-        let is_meant = edit.patches.is_empty() || edit.patches.contains(&patch.patch.chart.name);
-        if !is_meant {
+    let mut white: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (index, (patch, variations)) in rig.patches.iter().zip(&mut rig.variations).enumerate() {
+        let chart = &patch.patch.chart;
+        let mut named = edit.patches.iter();
+        if !edit.patches.is_empty() && !named.any(|name| is_called(&chart.name, name)) {
             continue;
         }
-        let values: Vec<f32> = patch
-            .patch
-            .neutral
-            .iter()
-            .map(|node| {
-                let place = skin.surface.closest(node);
-                skin.value(map, &rig.face, &place) as f32
-            })
-            .collect();
+        let values: Vec<f64> = match &painted {
+            Some((map, skin)) => {
+                let nodes = patch.patch.neutral.iter();
+                let places = nodes.map(|node| skin.surface.closest(node));
+                places.map(|at| skin.value(map, &rig.face, &at)).collect()
+            }
+            None => foldable(chart, edit.along),
+        };
         if values.iter().all(|&m| m == 0.0) {
             continue;
         }
         variations.resize(values.len(), NodeVariation::NONE);
-        for (v, m) in variations.iter_mut().zip(values) {
-            let [stretch, bend, rest_blend] = factors.map(|f| 1.0 + m * (f - 1.0));
+        for (v, &m) in variations.iter_mut().zip(&values) {
+            let [stretch, bend, rest_blend] = factors.map(|f| 1.0 + m as f32 * (f - 1.0));
             v.stretch = (v.stretch * stretch).clamp(1e-3, 1e3);
             v.bend = (v.bend * bend).clamp(1e-3, 1e3);
             v.rest_blend = (v.rest_blend * rest_blend).clamp(0.0, 1.0);
         }
+        white.push((index, values));
     }
+    narrow_skin(rig, &white, edit.narrow)
+}
+
+/// Where skin over a patch can fold: everywhere `along` the fibres that is asked for, but not on
+/// the lids or lips of a ring.
+fn foldable(chart: &PatchChart, along: Option<[f64; 2]>) -> Vec<f64> {
+    let grid = chart.grid;
+    let last = f64::from(grid.v_count.max(2) - 1);
+    let around = f64::from(grid.u_count.max(2) - u32::from(!grid.is_periodic));
+    let smooth = |t: f64| {
+        let t = t.clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    (0..grid.node_count() as u32)
+        .map(|node| {
+            let outwards = f64::from(node / grid.u_count) / last;
+            let place = f64::from(node % grid.u_count) / around;
+            let on_ring = match chart.kind {
+                PatchKind::Sphincter => smooth((outwards - RING_SHARE) / RING_RISE),
+                PatchKind::LinearMuscle | PatchKind::FatPad => 1.0,
+            };
+            let within = along.map_or(1.0, |[from, to]| {
+                let outside = (from - place).max(place - to);
+                smooth(1.0 - outside / ALONG_FADE)
+            });
+            on_ring * within
+        })
+        .collect()
+}
+
+/// Lets skin over white nodes hang on them alone.
+fn narrow_skin(rig: &mut Rig, white: &[(usize, Vec<f64>)], most: f64) -> Result<(), EditError> {
+    if most == 0.0 || white.is_empty() {
+        return Ok(());
+    }
+    let mut patches = Vec::new();
+    let mut start = 0;
+    let mut wanted = white.iter().peekable();
+    for (index, patch) in rig.patches.iter().enumerate() {
+        if wanted.next_if(|(w, _)| *w == index).is_some() {
+            patches.push(NarrowPatch::new(&patch.patch, start)?);
+        }
+        start += patch.patch.neutral.len() as u32;
+    }
+    let skin: Vec<Point> = rig
+        .face
+        .positions()
+        .iter()
+        .map(|p| rig.to_head * p)
+        .collect();
+    let normals = vertex_normals(&skin, &rig.face.triangles());
+    let value =
+        |_: usize, patch: usize, uv: [f64; 2]| most * patches[patch].at(uv, &white[patch].1);
+    let binding = rig.binding.narrowed(&patches, &skin, &normals, &value)?;
+    rig.binding = binding;
     Ok(())
 }
 
 fn check_factors(name: &str, edit: &WrinkleEdit) -> Result<(), EditError> {
+    let [from, to] = edit.along.unwrap_or([0.0, 1.0]);
     for (what, value, [low, high], condition) in [
         ("stretch", edit.stretch, [1e-3, 1e3], "from 0.001 to 1000"),
         ("bend", edit.bend, [1e-3, 1e3], "from 0.001 to 1000"),
         ("rest_blend", edit.rest_blend, [0.0, 1.0], "from 0 to 1"),
+        ("narrow", edit.narrow, [0.0, 1.0], "from 0 to 1"),
+        ("along", from, [0.0, 1.0], "from 0 to 1"),
+        ("along", to, [from.min(1.0), 1.0], "from its start to 1"),
     ] {
         if !(low..=high).contains(&value) {
             return Err(EditError::OutOfRange {
@@ -185,7 +259,7 @@ fn check_factors(name: &str, edit: &WrinkleEdit) -> Result<(), EditError> {
 fn check_patches(rig: &Rig, edit: &WrinkleEdit) -> Result<(), EditError> {
     let names = || rig.patches.iter().map(|p| p.patch.chart.name.as_str());
     for wanted in &edit.patches {
-        if !names().any(|name| name == wanted) {
+        if !names().any(|name| is_called(name, wanted)) {
             return Err(EditError::UnknownName {
                 what: "patch",
                 found: wanted.clone(),

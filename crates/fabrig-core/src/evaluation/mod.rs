@@ -4,6 +4,8 @@
 //! the face's own, vertex by vertex. Delta transfer, the yardstick, adds the template's whole
 //! displacements times the ratio of head sizes at the same places of the same registration.
 //!
+//! [`measure_wrinkles`]: how deep skin wrinkles and how finely, beside what a beam on springs does.
+//!
 //! # Source
 //!
 //! Zhu & Joslin 2024, section 4.2, Table 3.
@@ -14,6 +16,7 @@ mod faces;
 mod methods;
 mod space_map;
 mod table3;
+mod wrinkles;
 
 pub use check::{
     CheckError, CheckGates, CheckReport, Finding, GATES, Gate, MuscleCheck, RegionDistance,
@@ -22,3 +25,7 @@ pub use check::{
 pub use faces::{OwnFace, synthetic_faces};
 pub use methods::{Drive, METHODS, Method, POSES, Pose};
 pub use table3::{FaceResult, PoseError, RegionError, Table3, Table3Error, evaluate_face};
+pub use wrinkles::{
+    Site, WRINKLE_CASES, Winkler, WrinkleCase, WrinkleError, WrinkleFigures, WrinkleMeasure,
+    figures_of_lines, measure_wrinkles, winkler,
+};

@@ -10,7 +10,10 @@ use crate::mesh::{Mesh, VertexOrigin};
 use crate::registration::{
     CutSeams, Progress, RegistrationOptions, RegistrationReport, StageTime, cut_seams, register,
 };
-use crate::rig::{Expression, FaceOnTemplate, Rig, RigOptions, build, carry_expressions};
+use crate::rig::{
+    Expression, FaceOnTemplate, Rig, RigOptions, SkinRefinement, build, carry_expressions,
+    refine_on_template, refined_face,
+};
 use crate::template::Template;
 
 /// How a face is rigged.
@@ -32,6 +35,8 @@ pub struct RigFaceOptions {
     /// Expressions of this face on meshes of their own, in the units of the mesh that the other
     /// expressions are on.
     pub scans: Vec<ExpressionScan>,
+    /// Where the mesh is made finer before it is bound; nowhere by default.
+    pub refinement: Option<SkinRefinement>,
 }
 
 /// A face with its rig.
@@ -138,11 +143,23 @@ pub fn rig_face(
         .with_positions(registration.positions.clone())?;
     let mut on_template = FaceOnTemplate::from_registration(face, &registration)?;
     on_template.examples = &examples;
-    let mut rig = build(&on_template, template, &options.rig)?;
+    let (mut rig, face_origins) = match &options.refinement {
+        None => (build(&on_template, template, &options.rig)?, None),
+        Some(wanted) => {
+            let (finer, places) = refine_on_template(&on_template, template, &options.rig, wanted)?;
+            let finer_face = refined_face(&on_template, &finer.mesh, &places);
+            let rig = build(&finer_face, template, &options.rig)?;
+            (rig, Some(finer.face_origins))
+        }
+    };
     name_parts_by_groups(&mut rig);
     let mut report = registration.report;
     if let Some(file) = &options.source {
-        report.warnings.extend(rig.keep_appearance(file)?);
+        let notes = match face_origins {
+            None => rig.keep_appearance(file)?,
+            Some(origins) => rig.keep_appearance_of(face, &origins, file)?,
+        };
+        report.warnings.extend(notes);
     }
     for shape in rig.dead_shapes() {
         report.warnings.push(match shape {

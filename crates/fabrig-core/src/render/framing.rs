@@ -19,6 +19,10 @@ pub enum Framing {
     Eyes,
     /// The left eye.
     Eye,
+    /// Brows to hairline.
+    Forehead,
+    /// The outer corner of the left eye with the skin beside it.
+    EyeCorner,
 }
 
 /// Points on both sides are named by their left one.
@@ -31,6 +35,18 @@ const EYE: [&str; 5] = [
     "orbit_lateral_l",
     "orbit_bottom_l",
     "eye_inner_l",
+];
+const FOREHEAD: [&str; 4] = [
+    "hairline_mid",
+    "hairline_lateral_l",
+    "brow_outer_l",
+    "nasion",
+];
+const EYE_CORNER: [&str; 4] = [
+    "brow_outer_l",
+    "cheekbone_l",
+    "orbit_lateral_l",
+    "lower_lid_crease_l",
 ];
 
 impl Framing {
@@ -45,13 +61,15 @@ impl Framing {
             Self::Mouth => &MOUTH,
             Self::Eyes => &EYES,
             Self::Eye => &EYE,
+            Self::Forehead => &FOREHEAD,
+            Self::EyeCorner => &EYE_CORNER,
         };
         let at = |name: &str| {
             let vertex = template.landmarks.get(name)?;
             positions.get(*vertex as usize).copied()
         };
         let mut points: Vec<Point> = names.iter().filter_map(|name| at(name)).collect();
-        if self != Self::Eye {
+        if !matches!(self, Self::Eye | Self::EyeCorner) {
             let partners = names.iter().filter_map(|name| name.strip_suffix("_l"));
             points.extend(partners.filter_map(|stem| at(&format!("{stem}_r"))));
         }

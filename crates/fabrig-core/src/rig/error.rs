@@ -33,6 +33,15 @@ pub enum RigError {
     /// The mesh has no surface to carry expressions from.
     #[error(transparent)]
     Surface(#[from] crate::mesh::SurfaceError),
+    /// The skin cannot be refined as asked.
+    #[error("the skin cannot be refined: {problem}")]
+    Refinement {
+        /// Why not, and what to give.
+        problem: String,
+    },
+    /// The refined skin is no mesh.
+    #[error(transparent)]
+    Mesh(#[from] crate::mesh::MeshError),
     /// Skin could not be bound.
     #[error(transparent)]
     Skin(#[from] SkinError),

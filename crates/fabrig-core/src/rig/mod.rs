@@ -10,6 +10,7 @@ mod expressions;
 mod file;
 mod parts;
 mod put_on_face;
+mod refine_skin;
 mod sockets;
 mod template_side;
 mod tongue;
@@ -19,6 +20,8 @@ pub use error::RigError;
 pub use expressions::{Expression, carry_expressions};
 pub use file::{FORMAT_VERSION, OLDEST_VERSION};
 pub use parts::RigPart;
+pub use refine_skin::{FOLDING_PATCHES, SkinRefinement, refine_on_template, refined_face};
+pub(crate) use refine_skin::{RING_SHARE, is_called};
 pub use template_side::{fit_template_weights, stored_template_weights, write_template_weights};
 pub use tongue::PartShape;
 
@@ -122,6 +125,35 @@ impl Rig {
         if appearance.is_empty() {
             // Then there is nothing to know but that.
             notes.clear();
+        }
+        self.appearance = (!appearance.is_empty()).then_some(appearance);
+        Ok(notes)
+    }
+
+    /// As [`Self::keep_appearance`], for a face that was refined.
+    ///
+    /// - `coarse`: the mesh that it was refined from
+    /// - `face_origins`: for each polygon of the face that of `coarse`
+    ///
+    /// # Errors
+    ///
+    /// [`RigError::Appearance`]: the file cannot be read, or holds another mesh.
+    pub fn keep_appearance_of(
+        &mut self,
+        coarse: &Mesh,
+        face_origins: &[u32],
+        file: &Path,
+    ) -> Result<Vec<String>, RigError> {
+        let mut notes = Vec::new();
+        let mut appearance = Appearance::of_file(file, coarse, &mut notes)?;
+        if appearance.is_empty() {
+            notes.clear();
+        }
+        if !appearance.of_polygon.is_empty() {
+            let origins = face_origins.iter();
+            appearance.of_polygon = origins
+                .map(|&face| appearance.of_polygon[face as usize])
+                .collect();
         }
         self.appearance = (!appearance.is_empty()).then_some(appearance);
         Ok(notes)

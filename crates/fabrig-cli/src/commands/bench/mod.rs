@@ -10,6 +10,7 @@ mod runtime;
 mod stability;
 mod table3;
 mod table3_page;
+mod wrinkles;
 
 use anyhow::Result;
 
@@ -26,5 +27,6 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),
         BenchCommand::Table3(args) => table3::run(console, args),
+        BenchCommand::Wrinkles(args) => wrinkles::run(console, args),
     }
 }

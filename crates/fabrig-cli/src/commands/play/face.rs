@@ -10,7 +10,7 @@ use super::Source;
 use super::parameters::Change;
 use super::server::{Announcement, Server, Topic};
 use crate::cli::PlayArgs;
-use crate::commands::animate::{load_rig, read_take, scene};
+use crate::commands::animate::{load_rig_for, read_take, scene};
 use crate::commands::stem;
 
 /// The source.
@@ -29,7 +29,7 @@ pub(super) struct SimulatedFace {
 
 impl SimulatedFace {
     pub(super) fn new(args: &PlayArgs) -> Result<Self> {
-        let rig = Arc::new(load_rig(&args.input)?);
+        let rig = Arc::new(load_rig_for(&args.input, &args.scene)?);
         let clip = match &args.motion {
             Some(path) => Some(read_take(path, &args.take)?),
             None => None,
