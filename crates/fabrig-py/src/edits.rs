@@ -1,8 +1,9 @@
 //! Edits of single muscles.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fabrig_core::edit::{EditError, Edits, edits_path, import_muscle_shape};
+use fabrig_core::edit::{EditError, Edits, edits_path, import_muscle_shape, presets};
 use fabrig_core::rig::Rig;
 use pyo3::prelude::*;
 
@@ -12,10 +13,11 @@ use crate::mesh::PyMesh;
 use crate::rig::PyRig;
 use crate::simulation::json_of;
 
-/// What an artist changes on a rig, by name: muscle shapes, patches, materials. The fields are
-/// those of `face.edits.toml`.
+/// What an artist changes on a rig, by name: presets, muscle shapes, patches, materials. The
+/// fields are those of `face.edits.toml`.
 ///
-/// - `edits`: {"shapes": {...}, "patches": {...}, "materials": {...}}; nothing by default
+/// - `edits`: {"preset": "looser_skin", "shapes": {...}, "patches": {...}, "materials": {...}};
+///   nothing by default
 ///
 /// >>> smile = "zygomaticus_major_l.mouthSmileLeft"
 /// >>> edits = fabrig.Edits({"shapes": {smile: {"strength": 1.4}}})
@@ -39,6 +41,16 @@ impl PyEdits {
         let text = json_of("edits", edits)?;
         let inner = serde_json::from_str(&text).map_err(|e| input(format!("edits: {e}")))?;
         Ok(Self { inner })
+    }
+
+    /// What `{"preset": name}` knows: names with what they make of a face.
+    ///
+    /// >>> sorted(fabrig.Edits.presets())
+    /// ['aged', 'firmer_skin', 'less_fat', 'looser_skin', 'more_fat']
+    #[staticmethod]
+    fn presets() -> PyResult<BTreeMap<String, String>> {
+        let known = presets().map_err(to_py)?;
+        Ok(known.into_iter().map(|(name, p)| (name, p.about)).collect())
     }
 
     /// Reads a file of edits.

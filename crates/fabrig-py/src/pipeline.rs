@@ -14,7 +14,7 @@ use fabrig_core::pipeline::{
     rig_face,
 };
 use fabrig_core::recording::RecordedKind;
-use fabrig_core::rig::Expression;
+use fabrig_core::rig::{Expression, SkinRefinement};
 use fabrig_core::template::Template;
 use fabrig_core::transfer::{AlphaMode, JawMode, OffsetMode};
 use pyo3::prelude::*;
@@ -51,6 +51,8 @@ use crate::template::template_of;
 /// - `jaw`: how it opens, about its "hinge" or on a "linear" way, as in the paper
 /// - `resolution`: of the patches: "coarse" 2,010 nodes, "standard" 19,380, "fine" 50,080,
 ///   "finest" 200,320; all but the standard one fit the skin's weights anew, which takes a while
+/// - `refine_skin`: the mesh is parted over forehead and eyes until its edges are no longer than
+///   this, in millimetres, so that it can hold wrinkles; new vertices follow those given
 /// - `template`: a `Template`, or the folder of one, instead of the bundled one
 /// - `progress`: True for a bar, or a function of (stage, share)
 ///
@@ -61,7 +63,7 @@ use crate::template::template_of;
 #[pyo3(signature = (
     vertices, faces=None, *, landmarks=None, landmarks_order=None, unit=None, min_confidence=None,
     cut_seams=None, expressions=None, alpha="own", offsets="global", jaw="hinge",
-    resolution="standard", template=None, progress=None
+    resolution="standard", refine_skin=None, template=None, progress=None
 ))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn rig(
@@ -78,6 +80,7 @@ pub(crate) fn rig(
     offsets: &str,
     jaw: &str,
     resolution: &str,
+    refine_skin: Option<f64>,
     template: Option<&Bound<'_, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PyRig> {
@@ -120,6 +123,7 @@ pub(crate) fn rig(
     options.rig.offsets = one_of("offsets", offsets, &OFFSET_MODES)?;
     options.rig.jaw_mode = one_of("jaw", jaw, &JAW_MODES)?;
     options.rig.resolution = one_of("resolution", resolution, &RESOLUTIONS)?;
+    options.refinement = refine_skin.map(SkinRefinement::to);
     let template = template_of(template)?;
     if let Some(expressions) = expressions {
         let own = own_expressions(py, expressions, &face, &template)?;

@@ -92,6 +92,10 @@ def edits(rig: fabrig.Rig, folder: Path) -> None:
     for given in (stronger, stronger.to_dict(), path):
         edited = rig.with_edits(given).muscle_shape(SMILE).vertices
         assert np.allclose(edited, rest + 1.4 * motion, atol=1e-3)
+    assert "looser_skin" in fabrig.Edits.presets()
+    fuller = rig.with_edits({"preset": ["more_fat"]})
+    more = fuller.patch("malar_fat_l") - rig.patch("malar_fat_l")
+    assert 1 < np.linalg.norm(more, axis=-1).max() < 4
     sculpted = fabrig.Edits()
     assert sculpted.sculpt(rig, SMILE, shape.with_vertices(shape.vertices + [0, 2, 0])) == 420
     moved = rig.with_edits(sculpted).muscle_shape(SMILE).vertices

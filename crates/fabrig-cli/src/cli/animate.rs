@@ -171,7 +171,7 @@ pub(crate) struct DemoArgs {
     /// What is played
     #[arg(long, value_enum, default_value_t = DemoScene::Performance)]
     pub(crate) story: DemoScene,
-    /// Also draw the contact story into this folder
+    /// Also draw the story (contact or physics) into this folder
     #[arg(long, value_name = "FOLDER")]
     pub(crate) pictures: Option<PathBuf>,
     #[command(flatten)]
@@ -187,6 +187,9 @@ pub(crate) enum DemoScene {
     Performance,
     /// Lips that stick, a finger on the cheek, a ball on the forehead, blinks: contact is on
     Contact,
+    /// Forehead lines, crow's feet, lying down, a gust, a shake of the head: skin is loose and
+    /// fine, and there is more fat
+    Physics,
 }
 
 pub(super) fn parse_rate(text: &str) -> Result<f64, String> {

@@ -32,6 +32,9 @@ pub(crate) enum BenchCommand {
     /// How deep and how finely loose skin wrinkles, on patches and on the skin over them, beside
     /// what a beam on springs does
     Wrinkles(BenchWrinklesArgs),
+    /// Whether fat keeps its volume under gravity from every side, and how it rings, beside an
+    /// oscillator of its materials
+    SoftTissue(BenchSoftTissueArgs),
     /// How near rigs come to faces' own expressions, beside whole-face delta transfer
     Table3(BenchTable3Args),
 }
@@ -47,6 +50,16 @@ pub(crate) struct BenchWrinklesArgs {
     /// Skin that is measured: looser_skin, firmer_skin or aged
     #[arg(long, value_name = "PRESET", default_value = "looser_skin")]
     pub(crate) preset: String,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchSoftTissueArgs {
+    /// Skin and fat that are not the bundled face's own, with commas between
+    #[arg(long, value_name = "PRESET", value_delimiter = ',')]
+    pub(crate) preset: Vec<String>,
     /// Print as JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -4,35 +4,55 @@ use anyhow::{Result, ensure};
 use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::pipeline::{AnimateOptions, RigFaceOptions};
+use fabrig_core::rig::SkinRefinement;
 use fabrig_core::scene::Scene;
 use fabrig_core::template;
 use serde_json::json;
 
-use super::animate::{outcome, print_report, record, scene};
-use super::contact_pictures::draw;
+use super::animate::{apply_presets, outcome, print_report, record, scene};
 use super::rig;
+use super::story_pictures::{CONTACT, PHYSICS, Story, draw};
 use super::viewers::print_how_to_open;
 use super::{Outcome, check_output};
 use crate::cli::{DemoArgs, DemoScene};
 use crate::console::Console;
+
+/// Longest edge of the skin that shows wrinkles. (mm)
+const FINE_SKIN: f64 = 1.5;
+/// What the physics story is played with, unless presets are given.
+const PHYSICS_PRESETS: [&str; 2] = ["looser_skin", "more_fat"];
 
 pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     check_output(&args.output)?;
     if let Some(path) = &args.rig {
         check_output(path)?;
     }
-    let is_contact = args.story == DemoScene::Contact;
+    let stories: &[Story] = match args.story {
+        DemoScene::Performance => &[],
+        DemoScene::Contact => &CONTACT,
+        DemoScene::Physics => &PHYSICS,
+    };
     ensure!(
-        is_contact || args.pictures.is_none(),
-        "--pictures draws the contact story; add --story contact"
+        args.pictures.is_none() || !stories.is_empty(),
+        "--pictures draws a story; add --story contact or --story physics"
     );
     let face = template::demo_face();
     let (take, name) = match args.story {
         DemoScene::Performance => (template::demo_take(), "demo"),
         DemoScene::Contact => (template::demo_contact_take(), "contact"),
+        DemoScene::Physics => (template::demo_physics_take(), "physics"),
     };
     let clip = motion::parse(take, "the bundled take", &ReadOptions::default())?;
-    let rigged = rig::rig(console, &face, &RigFaceOptions::default())?;
+    let is_physics = args.story == DemoScene::Physics;
+    let options = RigFaceOptions {
+        refinement: is_physics.then(|| SkinRefinement::to(FINE_SKIN)),
+        ..RigFaceOptions::default()
+    };
+    let mut rigged = rig::rig(console, &face, &options)?;
+    if is_physics && args.scene.preset.is_empty() {
+        apply_presets(&mut rigged.rig, &PHYSICS_PRESETS.map(str::to_owned))?;
+    }
+    apply_presets(&mut rigged.rig, &args.scene.preset)?;
     if let Some(path) = &args.rig {
         rigged.rig.save(path)?;
     }
@@ -58,7 +78,7 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
         print_how_to_open(console, &args.output);
     }
     if let Some(folder) = &args.pictures {
-        draw(console, &args.output, folder, &positions, &hinge)?;
+        draw(console, &args.output, folder, &positions, &hinge, stories)?;
     }
     Ok(outcome(console, &report))
 }

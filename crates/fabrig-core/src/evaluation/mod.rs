@@ -4,6 +4,7 @@
 //! the face's own, vertex by vertex. Delta transfer, the yardstick, adds the template's whole
 //! displacements times the ratio of head sizes at the same places of the same registration.
 //!
+//! [`pad_volumes`] and [`pad_rings`]: whether fat keeps its volume and how it rings.
 //! [`measure_wrinkles`]: how deep skin wrinkles and how finely, beside what a beam on springs does.
 //!
 //! # Source
@@ -14,6 +15,7 @@ mod check;
 mod delta_transfer;
 mod faces;
 mod methods;
+mod soft_tissue;
 mod space_map;
 mod table3;
 mod wrinkles;
@@ -24,6 +26,10 @@ pub use check::{
 };
 pub use faces::{OwnFace, synthetic_faces};
 pub use methods::{Drive, METHODS, Method, POSES, Pose};
+pub use soft_tissue::{
+    Oscillation, PadRing, PadVolume, SoftTissueError, gravity_directions, oscillation, pad_rings,
+    pad_volumes,
+};
 pub use table3::{FaceResult, PoseError, RegionError, Table3, Table3Error, evaluate_face};
 pub use wrinkles::{
     Site, WRINKLE_CASES, Winkler, WrinkleCase, WrinkleError, WrinkleFigures, WrinkleMeasure,

@@ -79,7 +79,13 @@ pub fn demo_contact_take() -> &'static str {
     include_str!("../../../../templates/demo/contact.keys")
 }
 
-/// Colliders of that take as text: a finger on the demo face's cheek, a ball on its forehead.
+/// A take for what skin and fat do by themselves: brows that fold the forehead, eyes that fold
+/// their corners, a head that lies down, a gust, a shake.
+pub fn demo_physics_take() -> &'static str {
+    include_str!("../../../../templates/demo/physics.keys")
+}
+
+/// Colliders of the take for contact as text: a finger on the demo face's cheek, a ball on its forehead.
 pub fn demo_contact_colliders() -> &'static str {
     include_str!("../../../../templates/demo/contact.toml")
 }

@@ -13,7 +13,9 @@ mod pack;
 mod people;
 mod store;
 
-pub use demo::{demo_contact_colliders, demo_contact_take, demo_face, demo_take};
+pub use demo::{
+    demo_contact_colliders, demo_contact_take, demo_face, demo_physics_take, demo_take,
+};
 pub use error::TemplateError;
 pub(crate) use load::human_files;
 pub use load::{PackFiles, human};

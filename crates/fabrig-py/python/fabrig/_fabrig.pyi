@@ -181,6 +181,8 @@ class Registration:
 class Edits:
     def __new__(cls, edits: Mapping[str, Any] | None = None) -> Self: ...
     @staticmethod
+    def presets() -> dict[str, str]: ...
+    @staticmethod
     def load(path: Path) -> Edits: ...
     @staticmethod
     def beside(rig: Path) -> Edits: ...
@@ -469,6 +471,7 @@ def rig(
     offsets: str = "global",
     jaw: str = "hinge",
     resolution: str = "standard",
+    refine_skin: float | None = None,
     template: Template | Path | None = None,
     progress: Progress = None,
 ) -> Rig: ...

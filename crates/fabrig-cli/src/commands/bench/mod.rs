@@ -7,6 +7,7 @@ mod pareto;
 mod plot;
 mod registration;
 mod runtime;
+mod soft_tissue;
 mod stability;
 mod table3;
 mod table3_page;
@@ -26,6 +27,7 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
         BenchCommand::Pareto(args) => pareto::run(console, args),
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),
+        BenchCommand::SoftTissue(args) => soft_tissue::run(console, args),
         BenchCommand::Table3(args) => table3::run(console, args),
         BenchCommand::Wrinkles(args) => wrinkles::run(console, args),
     }

@@ -1,4 +1,4 @@
-//! Pictures of the demo's contact story, drawn from its recording.
+//! Pictures of the demo's stories, drawn from their recordings.
 
 use std::path::Path;
 
@@ -13,20 +13,38 @@ use fabrig_core::template::{JawHinge, human};
 use crate::console::Console;
 
 /// A picture with several moments side by side.
-struct Story {
+pub(super) struct Story {
     file: &'static str,
     view: View,
     framing: Framing,
+    /// Whether the head is drawn as if it had not moved.
+    is_steady: bool,
+    /// Width and height of one moment. (pixels)
+    size: [u32; 2],
+    columns: u32,
     /// (s)
     moments: &'static [f64],
 }
 
-const STORIES: [Story; 4] = [
+/// Defaults of a story's layout.
+const PLAIN: Story = Story {
+    file: "",
+    view: View::Front,
+    framing: Framing::Face,
+    is_steady: false,
+    size: [300, 250],
+    columns: 3,
+    moments: &[],
+};
+
+/// What touches and is touched.
+pub(super) const CONTACT: [Story; 4] = [
     Story {
         file: "contact_lips.png",
         view: View::Front,
         framing: Framing::Mouth,
         moments: &[0.6, 0.8, 0.9, 0.97, 1.03, 1.2],
+        ..PLAIN
     },
     Story {
         file: "contact_finger.png",
@@ -36,46 +54,98 @@ const STORIES: [Story; 4] = [
         },
         framing: Framing::Face,
         moments: &[2.7, 3.1, 3.6, 4.0, 4.5, 5.2],
+        ..PLAIN
     },
     Story {
         file: "contact_ball.png",
         view: View::ThreeQuarter,
         framing: Framing::Face,
         moments: &[5.7, 5.8, 5.9],
+        ..PLAIN
     },
     Story {
         file: "contact_blink.png",
         view: View::Front,
         framing: Framing::Eyes,
         moments: &[7.4, 7.5, 7.7, 8.1, 8.5, 8.9],
+        ..PLAIN
     },
 ];
 
-/// Width and height of one moment. (pixels)
-const SIZE: [u32; 2] = [300, 250];
-const COLUMNS: u32 = 3;
+/// What skin and fat do by themselves.
+pub(super) const PHYSICS: [Story; 5] = [
+    Story {
+        file: "physics_forehead.png",
+        framing: Framing::Forehead,
+        size: [420, 300],
+        columns: 2,
+        moments: &[0.2, 0.6, 0.8, 1.9],
+        ..PLAIN
+    },
+    Story {
+        file: "physics_crows_feet.png",
+        view: View::Angles {
+            yaw: 55.0,
+            pitch: 0.0,
+        },
+        framing: Framing::EyeCorner,
+        size: [420, 340],
+        columns: 2,
+        moments: &[2.5, 4.1],
+        ..PLAIN
+    },
+    Story {
+        file: "physics_lying_down.png",
+        view: View::ThreeQuarter,
+        is_steady: true,
+        size: [380, 400],
+        columns: 2,
+        moments: &[4.7, 7.1],
+        ..PLAIN
+    },
+    Story {
+        file: "physics_wind.png",
+        is_steady: true,
+        size: [380, 400],
+        columns: 2,
+        moments: &[8.35, 9.2],
+        ..PLAIN
+    },
+    Story {
+        file: "physics_shake.png",
+        size: [240, 260],
+        columns: 6,
+        moments: &[
+            10.40, 10.433, 10.467, 10.50, 10.533, 10.567, 10.60, 10.633, 10.667, 10.70, 10.733,
+            10.767,
+        ],
+        ..PLAIN
+    },
+];
 
 /// Draws all stories of a recording into a folder.
 ///
 /// - `positions`, `hinge`: the face in the template's topology (mm)
+/// - `stories`: those of what was recorded
 pub(super) fn draw(
     console: &Console,
     recording: &Path,
     folder: &Path,
     positions: &[Point],
     hinge: &JawHinge,
+    stories: &[Story],
 ) -> Result<()> {
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot create {}", folder.display()))?;
-    let mut sheets: Vec<Sheet> = STORIES.iter().map(|_| Sheet::new()).collect();
-    let total: usize = STORIES.iter().map(|story| story.moments.len()).sum();
+    let mut sheets: Vec<Sheet> = stories.iter().map(|_| Sheet::new()).collect();
+    let total: usize = stories.iter().map(|story| story.moments.len()).sum();
     let mut done = 0;
     let mut reader = RecordingReader::open(recording)?;
     let mut first: Option<RecordedFrame> = None;
     let mut before = f64::NEG_INFINITY;
     while let Some(frame) = reader.next_frame()? {
         let now = frame.time_secs;
-        for (story, sheet) in STORIES.iter().zip(&mut sheets) {
+        for (story, sheet) in stories.iter().zip(&mut sheets) {
             // The first frame at or after a moment shows it.
             let is_due = |&&t: &&f64| before < t - 1e-6 && t - 1e-6 <= now;
             if frame.skin.is_none() || !story.moments.iter().any(|t| is_due(&t)) {
@@ -83,8 +153,12 @@ pub(super) fn draw(
             }
             let first = first.as_ref().unwrap_or(&frame);
             let look = FaceLook::default();
-            let layers = recording_layers(&frame, first, RecordingContent::Face, &look)?;
-            let picture = Picture::new(SIZE[0], SIZE[1])
+            let mut shown = frame.clone();
+            if story.is_steady {
+                shown.head = Default::default();
+            }
+            let layers = recording_layers(&shown, first, RecordingContent::Face, &look)?;
+            let picture = Picture::new(story.size[0], story.size[1])
                 .with_view(story.view)
                 .with_focus(story.framing.points(human(), positions, hinge))
                 .with_layers(layers);
@@ -103,9 +177,9 @@ pub(super) fn draw(
         first.get_or_insert(frame);
     }
     console.clear();
-    for (story, sheet) in STORIES.iter().zip(&sheets) {
+    for (story, sheet) in stories.iter().zip(&sheets) {
         let path = folder.join(story.file);
-        sheet.compose(COLUMNS)?.save_png(&path)?;
+        sheet.compose(story.columns)?.save_png(&path)?;
         console.result(&path.display().to_string());
     }
     Ok(())

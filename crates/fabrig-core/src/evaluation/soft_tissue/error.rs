@@ -1,0 +1,16 @@
+use crate::cloth::MaterialError;
+use crate::scene::SceneError;
+
+/// Why soft tissue cannot be measured on a rig.
+#[derive(Debug, thiserror::Error)]
+pub enum SoftTissueError {
+    /// The rig has no pad of fat.
+    #[error("the rig has no fat pads, so there is nothing to measure")]
+    NoPads,
+    /// The face cannot be simulated.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The rig's materials are none.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+}
