@@ -167,7 +167,7 @@ fn wrong_edits_are_refused_and_change_nothing() {
             "[shapes.\"zygomaticus_major_l.mouthSmileLeftt\"]\nweight = 1\n",
             SHAPE,
         ),
-        ("[patches.malar_fat]\nalpha = 1\n", "malar_fat_"),
+        ("[patches.molar_fat]\nalpha = 1\n", "malar_fat_"),
         ("[patches.malar_fat_l]\nmaterial = \"fatt\"\n", "'fat'"),
         ("[materials.soft]\nlike = \"fet\"\n", "'fat'"),
         ("[materials.fat]\nmass = -1\n", "not valid"),

@@ -188,7 +188,7 @@ pub(crate) enum DemoScene {
     /// Lips that stick, a finger on the cheek, a ball on the forehead, blinks: contact is on
     Contact,
     /// Forehead lines, crow's feet, lying down, a gust, a shake of the head: skin is loose and
-    /// fine, and there is more fat
+    /// fine
     Physics,
 }
 

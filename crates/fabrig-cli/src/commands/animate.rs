@@ -63,6 +63,11 @@ fn run_faces(console: &Console, args: &AnimateArgs, mut scene: Scene) -> Result<
         "--resample is for takes of the command line alone; a scene's `fps` says how often it is \
          simulated"
     );
+    ensure!(
+        args.scene.preset.is_empty(),
+        "--preset is for a rig of the command line alone; write `preset = \"...\"` into the edits of \
+         a scene's face"
+    );
     let face = &mut scene.faces[0];
     if let Some(rig) = &args.rig {
         face.rig = std::path::absolute(rig)?;

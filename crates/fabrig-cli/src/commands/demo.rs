@@ -20,7 +20,7 @@ use crate::console::Console;
 /// Longest edge of the skin that shows wrinkles. (mm)
 const FINE_SKIN: f64 = 1.5;
 /// What the physics story is played with, unless presets are given.
-const PHYSICS_PRESETS: [&str; 2] = ["looser_skin", "more_fat"];
+const PHYSICS_PRESETS: [&str; 1] = ["looser_skin"];
 
 pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     check_output(&args.output)?;

@@ -429,7 +429,7 @@ fn maps_of(scene: &Path) -> Vec<PathBuf> {
         |_| Vec::new(),
         |scene| {
             let maps = scene.wrinkles.values().map(|edit| &edit.map);
-            maps.map(|map| scene.path_of(map)).collect()
+            maps.flatten().map(|map| scene.path_of(map)).collect()
         },
     )
 }

@@ -80,8 +80,8 @@ pub struct WrinkleEdit {
     /// Patches that it is for, with or without their side; none named means all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub patches: Vec<String>,
-    /// Without a map: the part of the way along the fibres that is white, 0 to 1; it fades over a
-    /// tenth of the way to either side. Of a ring, from its inner corner over the upper half.
+    /// The part of the way along the fibres that it is for, 0 to 1; it fades over a tenth of the
+    /// way to either side. Of a ring, from its inner corner over the upper half.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<[f64; 2]>,
     /// Factor of the resistances to stretch, compression and shear.
@@ -98,6 +98,18 @@ pub struct WrinkleEdit {
     /// mean of many nodes, which flattens what is finer than they are.
     #[serde(default = "one")]
     pub narrow: f64,
+}
+
+impl WrinkleEdit {
+    /// Whether it says where.
+    pub(super) fn check(&self, name: &str) -> Result<(), EditError> {
+        if self.map.is_none() && self.patches.is_empty() {
+            return Err(EditError::Syntax {
+                message: format!("[wrinkles.{name}] needs a `map`, or `patches` that fold"),
+            });
+        }
+        Ok(())
+    }
 }
 
 fn one() -> f64 {
@@ -131,11 +143,7 @@ impl Edits {
             message: error.to_string().trim().replace('\n', " "),
         })?;
         for (name, edit) in &edits.wrinkles {
-            if edit.map.is_none() && edit.patches.is_empty() {
-                return Err(EditError::Syntax {
-                    message: format!("[wrinkles.{name}] needs a `map`, or `patches` that fold"),
-                });
-            }
+            edit.check(name)?;
         }
         Ok(edits)
     }

@@ -3,7 +3,7 @@
 //! A pad of thickness t goes out by `t w`, with w = 1 in its middle and 0 at its rim (with its
 //! slope); the skin over it goes out as far as the pad does right under it, along its own normal.
 //! The neutral face itself changes, as more fat does, so a thicker pad is at rest. What lies
-//! under a pad stays.
+//! under a pad stays, and so does the face in the template's topology, which is registration's.
 
 use super::EditError;
 use crate::anatomy::GridShape;
@@ -14,6 +14,8 @@ use crate::{Point, Vector};
 
 /// Share of the grid over which the rim rises.
 const RIM: f64 = 0.4;
+/// Skin is a pad's own up to this share of the height at which it is no longer over it.
+const HEIGHT_SHARE: f64 = 0.6;
 
 /// Thickens pads of a rig.
 ///
@@ -39,7 +41,9 @@ pub(super) fn thicken(rig: &mut Rig, pads: &[(usize, f64)]) -> Result<(), EditEr
             // Pads lie side by side, and where they meet they are thin: lifts add.
             let one = |(pad, lift): &(NarrowPatch<'_>, Vec<f64>)| {
                 let footing = pad.under(point, normal)?;
-                Some(footing.share * pad.at(footing.uv, lift))
+                // Other skin, above or below, stays; between the two it is a slope, not a step.
+                let away = (footing.height.abs() - HEIGHT_SHARE) / (1.0 - HEIGHT_SHARE);
+                Some((1.0 - smooth(away)) * pad.at(footing.uv, lift))
             };
             if is_carried(vertex) {
                 on_skin.iter().filter_map(one).sum()
@@ -78,8 +82,7 @@ pub(super) fn thicken(rig: &mut Rig, pads: &[(usize, f64)]) -> Result<(), EditEr
 fn window(grid: GridShape, node: u32) -> f64 {
     let rise = |k: u32, count: u32| {
         let share = f64::from(k) / f64::from(count.max(2) - 1);
-        let t = (share.min(1.0 - share) / RIM).clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+        smooth(share.min(1.0 - share) / RIM)
     };
     let along = if grid.is_periodic {
         1.0
@@ -87,4 +90,9 @@ fn window(grid: GridShape, node: u32) -> f64 {
         rise(node % grid.u_count, grid.u_count)
     };
     along * rise(node / grid.u_count, grid.v_count)
+}
+
+fn smooth(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }

@@ -24,6 +24,8 @@ use crate::skin::NarrowPatch;
 const LARGEST_IMAGE: usize = 1 << 30;
 /// Over this share of a ring's way outwards its skin goes from never folding to folding.
 const RING_RISE: f64 = 0.2;
+/// The same from the rim of a sheet inwards.
+const RIM_RISE: f64 = 0.2;
 /// Share of the fibres' way over which white fades.
 const ALONG_FADE: f64 = 0.1;
 
@@ -134,6 +136,7 @@ pub fn apply_wrinkle_map(
     map: Option<&WrinkleMap>,
     edit: &WrinkleEdit,
 ) -> Result<(), EditError> {
+    edit.check(name)?;
     check_factors(name, edit)?;
     check_patches(rig, edit)?;
     let problem = |problem| EditError::WrinkleMap {
@@ -156,14 +159,19 @@ pub fn apply_wrinkle_map(
         if !edit.patches.is_empty() && !named.any(|name| is_called(&chart.name, name)) {
             continue;
         }
-        let values: Vec<f64> = match &painted {
+        let mut values: Vec<f64> = match &painted {
             Some((map, skin)) => {
                 let nodes = patch.patch.neutral.iter();
                 let places = nodes.map(|node| skin.surface.closest(node));
                 places.map(|at| skin.value(map, &rig.face, &at)).collect()
             }
-            None => foldable(chart, edit.along),
+            None => foldable(chart),
         };
+        if let Some(along) = edit.along {
+            for (node, value) in values.iter_mut().enumerate() {
+                *value *= within(chart, node, along);
+            }
+        }
         if values.iter().all(|&m| m == 0.0) {
             continue;
         }
@@ -179,31 +187,39 @@ pub fn apply_wrinkle_map(
     narrow_skin(rig, &white, edit.narrow)
 }
 
-/// Where skin over a patch can fold: everywhere `along` the fibres that is asked for, but not on
-/// the lids or lips of a ring.
-fn foldable(chart: &PatchChart, along: Option<[f64; 2]>) -> Vec<f64> {
+/// Where skin over a patch can fold: not on the lids or lips of a ring, nor at the rim of a sheet,
+/// beyond which skin hangs on something else.
+fn foldable(chart: &PatchChart) -> Vec<f64> {
     let grid = chart.grid;
     let last = f64::from(grid.v_count.max(2) - 1);
-    let around = f64::from(grid.u_count.max(2) - u32::from(!grid.is_periodic));
-    let smooth = |t: f64| {
-        let t = t.clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
-    };
     (0..grid.node_count() as u32)
-        .map(|node| {
-            let outwards = f64::from(node / grid.u_count) / last;
-            let place = f64::from(node % grid.u_count) / around;
-            let on_ring = match chart.kind {
-                PatchKind::Sphincter => smooth((outwards - RING_SHARE) / RING_RISE),
-                PatchKind::LinearMuscle | PatchKind::FatPad => 1.0,
-            };
-            let within = along.map_or(1.0, |[from, to]| {
-                let outside = (from - place).max(place - to);
-                smooth(1.0 - outside / ALONG_FADE)
-            });
-            on_ring * within
+        .map(|node| match chart.kind {
+            PatchKind::Sphincter => {
+                let outwards = f64::from(node / grid.u_count) / last;
+                smooth((outwards - RING_SHARE) / RING_RISE)
+            }
+            PatchKind::LinearMuscle | PatchKind::FatPad => {
+                let place = |k: u32, count: u32| f64::from(k) / f64::from(count.max(2) - 1);
+                let u = place(node % grid.u_count, grid.u_count);
+                let v = place(node / grid.u_count, grid.v_count);
+                let inwards = |share: f64| smooth(share.min(1.0 - share) / RIM_RISE);
+                inwards(u) * inwards(v)
+            }
         })
         .collect()
+}
+
+/// How much a node is on a part of the way along the fibres.
+fn within(chart: &PatchChart, node: usize, [from, to]: [f64; 2]) -> f64 {
+    let grid = chart.grid;
+    let around = f64::from(grid.u_count.max(2) - u32::from(!grid.is_periodic));
+    let place = f64::from(node as u32 % grid.u_count) / around;
+    smooth(1.0 - (from - place).max(place - to) / ALONG_FADE)
+}
+
+fn smooth(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// Lets skin over white nodes hang on them alone.

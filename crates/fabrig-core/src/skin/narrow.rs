@@ -41,6 +41,8 @@ pub struct Footing {
     pub uv: [f64; 2],
     /// How much the patch counts, 0 to 1.
     pub share: f64,
+    /// How far the point is above the patch, against the most that it may be; negative below.
+    pub height: f64,
 }
 
 impl<'a> NarrowPatch<'a> {
@@ -100,6 +102,7 @@ impl<'a> NarrowPatch<'a> {
         (is_above && near > 0.0).then_some(Footing {
             uv: [f64::from(u) + du, f64::from(v) + dv],
             share: near,
+            height: height / HIGHEST,
         })
     }
 

@@ -4,7 +4,13 @@
 //! pads swing back and ring. Rayleigh's quotient of the shape they hung in,
 //! `w^2 = sum m a . u / sum m u . u`, says how fast from nothing but how far they hung: the work
 //! of the load is that of the springs. Their damping is that of the materials weighed by how much
-//! each patch swings, `c = sum m c u^2 / sum m u^2`, without what stretching edges add.
+//! each patch swings, `c = sum m c u^2 / sum m u^2`: an upper bound, as muscles are damped more
+//! and their part of the swing dies first, and without what stretching edges add.
+//!
+//! # Limitations
+//!
+//! One frequency stands for a pad and all that it is stitched to. Pads that swing apart from their
+//! muscles ring up to half as fast again.
 
 use std::sync::Arc;
 

@@ -13,6 +13,7 @@ use super::SoftTissueError;
 use crate::anatomy::{Attachment, GridShape, PatchKind};
 use crate::cloth::STANDING_GRAVITY;
 use crate::rig::Rig;
+use crate::scene::fields::OverTime;
 use crate::scene::{FacePose, Scene, Simulation};
 
 /// Frames that a face is held under each gravity; fat that rings at 5 Hz has died away.
@@ -85,7 +86,7 @@ pub fn pad_volumes(
         .collect();
     for gravity in gravities {
         let scene = Scene {
-            gravity: *gravity,
+            gravity: OverTime::Constant(*gravity),
             ..scene.clone()
         };
         simulation = Simulation::new(Arc::clone(rig), scene, None)?;

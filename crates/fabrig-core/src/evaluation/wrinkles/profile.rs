@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_wave_on_a_bowl_is_measured_without_the_bowl() {
-        let line: Vec<(f64, f64)> = (0..101)
+        let line: Vec<(f64, f64)> = (0..201)
             .map(|k| {
                 let s = 0.5 * f64::from(k);
                 let wave = 0.4 * (std::f64::consts::TAU * s / 10.0).sin();

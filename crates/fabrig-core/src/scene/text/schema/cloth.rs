@@ -179,10 +179,10 @@ pub(in crate::scene::text) const MATERIAL: &[Key] = &[
 ];
 
 pub(super) const WRINKLES: &[Key] = &[
-    Key::required(
+    Key::optional(
         "map",
         Kind::Path,
-        "a PNG in texture coordinates, or a text of one number in [0, 1] a vertex",
+        "a PNG in texture coordinates, or a text of one number in [0, 1] a vertex; white without",
         "\"forehead.png\"",
     ),
     Key::optional(
@@ -208,5 +208,17 @@ pub(super) const WRINKLES: &[Key] = &[
         from_to(0.0, 1.0),
         "factor of `cloth.rest_blend`: 0 lets skin fold",
         "0.0",
+    ),
+    Key::optional(
+        "along",
+        Kind::List(&from_to(0.0, 1.0)),
+        "part of the fibres' way that it is for, from and to",
+        "[0.0, 1.0]",
+    ),
+    Key::optional(
+        "narrow",
+        from_to(0.0, 1.0),
+        "how far skin there hangs on these patches alone, so that it shows each fold",
+        "1.0",
     ),
 ];
