@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use fabrig_core::Point;
 use fabrig_core::mesh::{Mesh, Surface};
 use fabrig_core::pipeline::RiggedFace;
 use fabrig_core::registration::{DistanceStatistics, OpeningMeasure, OpeningState};
@@ -57,12 +56,7 @@ fn headline(source: &Path, rigged: &RiggedFace) -> String {
 fn pictures(rigged: &RiggedFace) -> Result<Vec<(Image, String)>> {
     let rig = &rigged.rig;
     let look = FaceLook::default();
-    let positions: Vec<Point> = rig
-        .face
-        .positions()
-        .iter()
-        .map(|p| rig.to_head * p)
-        .collect();
+    let positions = rig.face_in_head();
     let face: Mesh = rig.face.with_positions(positions)?;
     let fitted = &rigged.normalized;
     let surface = Surface::new(face.positions(), &face.triangles())?;

@@ -319,12 +319,7 @@ impl Skin {
                 corners.extend(fan.map(|k| [at(range.start), at(k), at(k + 1)]));
             }
         }
-        let positions: Vec<Point> = rig
-            .face
-            .positions()
-            .iter()
-            .map(|p| rig.to_head * p)
-            .collect();
+        let positions = rig.face_in_head();
         let triangles: Vec<[u32; 3]> = corners.iter().map(|t| t.map(|c| c.vertex)).collect();
         let surface = Surface::new(&positions, &triangles).map_err(|error| error.to_string())?;
         Ok(Self { surface, corners })

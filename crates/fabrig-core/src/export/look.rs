@@ -48,12 +48,7 @@ pub(super) fn of_parts(rig: &Rig) -> Appearance {
             part_of[vertex as usize] = Some(part);
         }
     }
-    let rest: Vec<Point> = rig
-        .face
-        .positions()
-        .iter()
-        .map(|p| rig.to_head * p)
-        .collect();
+    let rest = rig.face_in_head();
     let kind_of = |polygon: &[u32]| -> usize {
         let Some(part) = part_of[polygon[0] as usize] else {
             return 0;

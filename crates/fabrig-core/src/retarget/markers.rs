@@ -159,12 +159,7 @@ fn skin_surface(rig: &Rig) -> Result<Surface, RetargetError> {
     }
     let mut triangles = rig.face.triangles();
     triangles.retain(|t| !t.iter().any(|&v| is_rigid[v as usize]));
-    let rest: Vec<Point> = rig
-        .face
-        .positions()
-        .iter()
-        .map(|p| rig.to_head * p)
-        .collect();
+    let rest = rig.face_in_head();
     Ok(Surface::new(&rest, &triangles)?)
 }
 

@@ -208,12 +208,14 @@ impl Rig {
     }
 
     /// The user's mesh in the head frame. (mm), shape [face vertex_count]
+    pub fn face_in_head(&self) -> Vec<Point> {
+        let own = self.face.positions().iter();
+        own.map(|p| self.to_head * p).collect()
+    }
+
+    /// As [`Self::face_in_head`], in the precision of the moving skin.
     pub fn skin_at_rest(&self) -> Vec<Point3<f32>> {
-        self.face
-            .positions()
-            .iter()
-            .map(|p| (self.to_head * p).cast())
-            .collect()
+        self.face_in_head().iter().map(|p| p.cast()).collect()
     }
 
     /// What all patches share when Eq. 3 is evaluated.

@@ -161,36 +161,11 @@ fn carry(body: RigidBody, mandible: &Mandible, rest: &Point3<f32>) -> (Point3<f3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::anatomy::Resolution;
-    use crate::rig::{FaceOnTemplate, RigOptions, build, places_of_self};
-    use crate::template::human;
-
-    fn rig() -> Rig {
-        let template = human();
-        let face = FaceOnTemplate {
-            face: &template.skin,
-            to_head: nalgebra::Similarity3::identity(),
-            positions: template.skin.positions(),
-            places: &places_of_self(template),
-            rigid: &[],
-            examples: &[],
-            report: String::new(),
-        };
-        let options = RigOptions {
-            resolution: Resolution::COARSE,
-            fit: crate::skin::FitOptions {
-                candidate_limit: 4,
-                smoothing_rounds: 0,
-                ..Default::default()
-            },
-            ..RigOptions::default()
-        };
-        build(&face, template, &options).unwrap()
-    }
+    use crate::scene::tests::coarse_rig;
 
     #[test]
     fn anchors_stay_on_bone_or_on_the_shapes_within_the_slide() {
-        let rig = rig();
+        let rig = coarse_rig();
         let still = vec![0.0; rig.shape_names.len()];
         let mut weights = still.clone();
         weights[rig.shape_index("jawOpen").unwrap()] = 1.0;
@@ -225,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_mandible_moves_as_fast_as_its_place_changes() {
-        let rig = rig();
+        let rig = coarse_rig();
         let count = rig.shape_names.len();
         let (mut weights, mut rates) = (vec![0.0f32; count], vec![0.0f32; count]);
         for (name, weight, rate) in [("jawOpen", 0.4, 2.0), ("jawLeft", 0.3, -1.0)] {

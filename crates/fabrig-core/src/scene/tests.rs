@@ -8,20 +8,10 @@ use super::*;
 use crate::anatomy::Resolution;
 use crate::edit::Edits;
 use crate::motion::{ReadOptions, parse};
-use crate::rig::{FaceOnTemplate, Rig, RigOptions, build, places_of_self};
+use crate::rig::{Rig, RigOptions, rig_of_template};
 use crate::template::human;
 
 static RIG: LazyLock<Arc<Rig>> = LazyLock::new(|| {
-    let template = human();
-    let face = FaceOnTemplate {
-        face: &template.skin,
-        to_head: nalgebra::Similarity3::identity(),
-        positions: template.skin.positions(),
-        places: &places_of_self(template),
-        rigid: &[],
-        examples: &[],
-        report: String::new(),
-    };
     let options = RigOptions {
         resolution: Resolution::COARSE,
         fit: crate::skin::FitOptions {
@@ -31,7 +21,7 @@ static RIG: LazyLock<Arc<Rig>> = LazyLock::new(|| {
         },
         ..RigOptions::default()
     };
-    Arc::new(build(&face, template, &options).unwrap())
+    Arc::new(rig_of_template(human(), &options).unwrap())
 });
 
 /// The template's own face with few nodes.

@@ -60,12 +60,7 @@ impl<'a> Places<'a> {
         }
         let template_triangles = template.skin.triangles();
         let surface = Surface::new(&rig.positions, &template_triangles)?;
-        let positions: Vec<Point> = rig
-            .face
-            .positions()
-            .iter()
-            .map(|p| rig.to_head * p)
-            .collect();
+        let positions = rig.face_in_head();
         let is_skin = |v: &u32| rig.regions[*v as usize].is_some();
         let mut triangles = rig.face.triangles();
         triangles.retain(|t| t.iter().all(is_skin));
