@@ -1,5 +1,6 @@
 //! `fabrig animate`: a rig and a take become a recording.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::edit::{apply_preset, edits_path, load_edited_rig};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{
-    AnimateOptions, AnimateReport, ContactSummary, TimeStatistics, animate, animate_scene,
-    load_faces,
+    AnimateOptions, AnimateProgress, AnimateReport, ContactSummary, TimeStatistics, animate,
+    animate_scene, load_faces,
 };
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{Dynamics, Scene, SceneError};
@@ -34,7 +35,7 @@ pub(crate) fn run(console: &Console, args: &AnimateArgs) -> Result<Outcome> {
     let rig = load_rig_for(rig_path, &args.scene)?;
     let clip = read_take(motion, &args.take)?;
     let options = AnimateOptions {
-        fps: args.scene.fps.or(scene.fps),
+        fps: args.scene.fps,
         rig_name: stem(rig_path),
         take_name: stem(motion),
         recording: args.recording.options(&scene.recording),
@@ -83,10 +84,8 @@ fn run_faces(console: &Console, args: &AnimateArgs, mut scene: Scene) -> Result<
         recording: args.recording.options(&scene.recording),
         ..AnimateOptions::default()
     };
-    let report = animate_scene(&scene, faces, &args.output, &options, &mut |now| {
-        let detail = format!("{}/{} frames", now.frame, now.frame_count);
-        console.show("simulate", now.frame, now.frame_count, &detail)
-    });
+    let mut progress = progress(console);
+    let report = animate_scene(&scene, faces, &args.output, &options, &mut progress);
     console.clear();
     let report = report.with_context(|| in_scene(&args.scene))?;
     let [(_, first), ..] = &report.faces[..] else {
@@ -177,6 +176,14 @@ pub(super) fn read_take(path: &Path, args: &TakeArgs) -> Result<Clip> {
     })
 }
 
+/// Shows how many frames are simulated.
+fn progress(console: &Console) -> impl FnMut(AnimateProgress) -> ControlFlow<()> {
+    |now| {
+        let detail = format!("{}/{} frames", now.frame, now.frame_count);
+        console.show("simulate", now.frame, now.frame_count, &detail)
+    }
+}
+
 /// Simulates and records with a progress bar, and writes the viewers' files beside it.
 pub(super) fn record(
     console: &Console,
@@ -186,10 +193,8 @@ pub(super) fn record(
     output: &Path,
     options: &AnimateOptions,
 ) -> Result<AnimateReport> {
-    let report = animate(Arc::new(rig), clip, scene, output, options, &mut |now| {
-        let detail = format!("{}/{} frames", now.frame, now.frame_count);
-        console.show("simulate", now.frame, now.frame_count, &detail)
-    });
+    let rig = Arc::new(rig);
+    let report = animate(rig, clip, scene, output, options, &mut progress(console));
     console.clear();
     let report = report?;
     write_viewer_files(output, &report.foxglove_layout)?;

@@ -62,7 +62,7 @@ pub(crate) fn run(console: &Console, args: &DemoArgs) -> Result<Outcome> {
     }
     let scene = played_scene(args)?;
     let options = AnimateOptions {
-        fps: args.scene.fps.or(scene.fps),
+        fps: args.scene.fps,
         rig_name: "demo".to_owned(),
         take_name: name.to_owned(),
         recording: args.recording.options(&scene.recording),

@@ -26,7 +26,7 @@ pub(crate) fn run(console: &Console, args: &ExportArgs) -> Result<Outcome> {
             ShapeSource::Settled
         },
         baked: args.baked,
-        fps: args.scene.fps.or(scene.fps),
+        fps: args.scene.fps,
         check_sum: !args.skip_check,
         scene,
         ..layout(&args.layout, &args.rig)

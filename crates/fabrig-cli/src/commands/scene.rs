@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use fabrig_core::motion::ReadOptions;
-use fabrig_core::pipeline::{edits_of, load_faces, scene_duration, scene_rate};
+use fabrig_core::pipeline::{edits_of, frame_count, load_faces, scene_duration, scene_rate};
 use fabrig_core::scene::{Scene, Simulation, annotated_scene};
 use serde::Serialize;
 
@@ -79,7 +79,7 @@ fn summary(scene: &Scene) -> Result<Summary> {
     if !staged.is_empty() {
         let (fps, duration) = (scene_rate(scene, &staged), scene_duration(scene, &staged)?);
         (summary.fps, summary.duration) = (Some(fps), Some(duration));
-        summary.frames = Some((duration * fps + 1e-6).floor() as u64 + 1);
+        summary.frames = Some(frame_count(duration, fps));
     }
     for (index, face) in staged.into_iter().enumerate() {
         let own = &scene.faces[index];

@@ -16,7 +16,7 @@ use crate::atomic_file::write_atomically;
 use crate::cloth::Counters;
 use crate::export::{Elements, NpzWriter};
 use crate::motion::Clip;
-use crate::pipeline::recording_rate;
+use crate::pipeline::{frame_count, recording_rate};
 use crate::rig::Rig;
 use crate::scene::{Scene, SceneError, Simulation};
 
@@ -75,19 +75,16 @@ fn words(npz: &mut NpzWriter<impl io::Write>, list: &[(&str, &str)]) -> io::Resu
 }
 
 /// Simulates a take and writes its skin frame by frame; the same frames as a recording has.
-///
-/// - `fps`: frames a second; the take's own when `None` (1/s)
 pub(super) fn write_pair(
     path: &Path,
     rig: Arc<Rig>,
     clip: Clip,
     scene: Scene,
-    fps: Option<f64>,
     names: Names<'_>,
     progress: OnFraction<'_>,
 ) -> Result<PairReport, PairError> {
-    let fps = fps.unwrap_or_else(|| recording_rate(&clip));
-    let frame_count = (clip.duration() * fps + 1e-6).floor() as usize + 1;
+    let fps = scene.fps.unwrap_or_else(|| recording_rate(&clip));
+    let frame_count = frame_count(clip.duration(), fps) as usize;
     let vertex_count = rig.face.vertex_count();
     let mut report = PairReport {
         frames: frame_count,

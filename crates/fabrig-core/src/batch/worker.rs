@@ -303,8 +303,7 @@ impl AtWork<'_> {
             take: &self.take_name(),
             scene: task.scene.as_ref().map_or("", |scene| &scene.name),
         };
-        let fps = scene.fps;
-        let report = dataset::write_pair(path, rig, clip, scene, fps, names, progress);
+        let report = dataset::write_pair(path, rig, clip, scene, names, progress);
         let report = match report {
             Err(dataset::PairError::Stopped) => return Err(Break::Stopped),
             Err(dataset::PairError::Scene(error)) => {

@@ -64,7 +64,7 @@ pub struct ExportOptions {
     /// Whether the take is simulated and the vertices of every frame are written, instead of
     /// the weights of the shapes.
     pub baked: bool,
-    /// Frames a second of the animation; the take's own when `None`. (1/s)
+    /// Frames a second of the animation; the scene's or else the take's own when `None`. (1/s)
     pub fps: Option<f64>,
     /// Whether head motion is left out.
     pub still_head: bool,

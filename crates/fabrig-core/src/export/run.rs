@@ -56,7 +56,7 @@ pub fn export(
         || format == ExportFormat::Obj && options.motion.is_some();
     let mut writer = Writer::new(output, format, &face, notes);
     if let (true, Some(clip)) = (is_baked, &options.motion) {
-        let fps = rate(clip, options.fps)?;
+        let fps = rate(clip, options)?;
         let mut frames = SimulatedTake::new(rig, clip, &options.scene, fps, placement)?;
         writer.write_frames(&mut frames, options, progress)?;
     } else {
@@ -73,7 +73,7 @@ pub fn export(
             },
         )?;
         let animation = options.motion.as_ref().map(|clip| {
-            let fps = rate(clip, options.fps)?;
+            let fps = rate(clip, options)?;
             let name = &options.motion_name;
             weights_of_take(rig, clip, name, fps, options.still_head, &placement)
         });
@@ -127,7 +127,7 @@ fn compare(
             (&bundled, "the bundled take")
         }
     };
-    let fps = rate(clip, options.fps)?;
+    let fps = rate(clip, options)?;
     let animation = weights_of_take(rig, clip, name, fps, true, placement)?;
     let mut frames = SimulatedTake::new(rig, clip, &options.scene, fps, *placement)?;
     linear_error(&animation, shapes, &mut frames, &mut |fraction| {

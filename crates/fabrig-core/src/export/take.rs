@@ -7,10 +7,10 @@ use nalgebra::Isometry3;
 
 use super::face::{Frame, Placement, Shape, WeightAnimation};
 use super::shapes::shape_order;
-use super::{ExportError, LinearError};
+use super::{ExportError, ExportOptions, LinearError};
 use crate::Vector;
 use crate::motion::Clip;
-use crate::pipeline::recording_rate;
+use crate::pipeline::{frame_count, recording_rate};
 use crate::rig::Rig;
 use crate::scene::{Scene, Simulation};
 
@@ -24,9 +24,9 @@ pub(super) trait FrameSource {
     fn next_frame(&mut self) -> Result<Option<Frame>, ExportError>;
 }
 
-/// Checked frames a second of a take.
-pub(super) fn rate(clip: &Clip, asked: Option<f64>) -> Result<f64, ExportError> {
-    match asked {
+/// Checked frames a second of a take: those asked for, or else the scene's or the take's.
+pub(super) fn rate(clip: &Clip, options: &ExportOptions) -> Result<f64, ExportError> {
+    match options.fps.or(options.scene.fps) {
         Some(found) if !(found > 0.0 && found <= 1000.0) => Err(ExportError::Option {
             name: "fps",
             expected: "above 0 and at most 1000",
@@ -35,10 +35,6 @@ pub(super) fn rate(clip: &Clip, asked: Option<f64>) -> Result<f64, ExportError> 
         Some(fps) => Ok(fps),
         None => Ok(recording_rate(clip)),
     }
-}
-
-fn frame_count(clip: &Clip, fps: f64) -> usize {
-    (clip.duration() * fps + 1e-6).floor() as usize + 1
 }
 
 /// The weights of a take, in [`shape_order`].
@@ -61,7 +57,7 @@ pub(super) fn weights_of_take(
         weights: Vec::new(),
         heads: Vec::new(),
     };
-    for frame in 0..frame_count(clip, fps) {
+    for frame in 0..frame_count(clip.duration(), fps) {
         let time = frame as f64 / fps;
         let pose = simulation.pose_at(start + time);
         let weights = order.iter();
@@ -98,7 +94,7 @@ impl SimulatedTake {
             simulation,
             placement,
             fps,
-            frame_count: frame_count(clip, fps),
+            frame_count: frame_count(clip.duration(), fps) as usize,
             next: 0,
         })
     }

@@ -13,7 +13,9 @@ use super::frames::FrameMaker;
 use crate::Error;
 use crate::cloth::Counters;
 use crate::motion::{Clip, ClipNotes};
-use crate::recording::{McapRecorder, RecordingOptions, RecordingReport, foxglove_layout};
+use crate::recording::{
+    McapRecorder, RecordingInfo, RecordingOptions, RecordingReport, foxglove_layout,
+};
 use crate::rig::Rig;
 use crate::scene::{FrameReport, Scene, Simulation};
 
@@ -92,7 +94,8 @@ pub struct AnimateReport {
 /// Frame rates that a take's own rate is taken for when it is this near: timecodes are rounded.
 const STANDARD_RATES: [f64; 7] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0];
 const RATE_TOLERANCE: f64 = 0.005;
-const DEFAULT_RATE: f64 = 60.0;
+/// Frames a second of what has no rate of its own. (1/s)
+pub(super) const DEFAULT_RATE: f64 = 60.0;
 
 /// The rate at which a take is simulated unless another is asked for: its own.
 pub fn recording_rate(clip: &Clip) -> f64 {
@@ -120,53 +123,106 @@ pub fn animate(
     options: &AnimateOptions,
     progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
 ) -> Result<AnimateReport, Error> {
-    let wall = Instant::now();
-    let asked = options.fps.or(scene.fps);
-    let fps = asked.unwrap_or_else(|| recording_rate(&clip));
+    let fps = options.fps.or(scene.fps);
+    let fps = fps.unwrap_or_else(|| recording_rate(&clip));
     let maker = FrameMaker::new(&rig, options.recording);
     let info = maker.info(&rig, Some(&clip), &scene, fps, options)?;
-    let foxglove_layout = foxglove_layout(&[&info], &options.recording);
-    // Opened first: it refuses a bad frame rate or folder before anything is computed.
-    let mut recorder = McapRecorder::create(output, info, options.recording)?;
     let take = clip.notes().clone();
     let duration = scene.duration.unwrap_or_else(|| clip.duration());
-    let frame_count = (duration * fps + 1e-6).floor() as u64 + 1;
-    let run = Simulation::new(rig, scene, Some(clip))
-        .map_err(Error::from)
-        .and_then(|simulation| {
-            let mut runs = [Run::new(simulation, maker)];
-            record_all(&mut runs, &mut recorder, fps, frame_count, progress)?;
-            Ok(runs)
-        });
-    let [run] = match run {
+    let cast = Cast {
+        infos: vec![info],
+        takes: vec![take],
+        fps,
+        duration,
+    };
+    let start = || {
+        let simulation = Simulation::new(rig, scene, Some(clip))?;
+        Ok(vec![Run::new(simulation, maker)])
+    };
+    let mut reports = record_cast(cast, start, output, &options.recording, progress)?;
+    // As many reports as there were faces.
+    Ok(reports.swap_remove(0))
+}
+
+/// Frames of a stretch of time, its first and last among them.
+///
+/// - `duration` (s), `fps` (1/s)
+pub fn frame_count(duration: f64, fps: f64) -> u64 {
+    (duration * fps + 1e-6).floor() as u64 + 1
+}
+
+/// Faces that are recorded together.
+pub(super) struct Cast {
+    /// What the recording says of each.
+    pub(super) infos: Vec<RecordingInfo>,
+    /// What reading the take of each had to decide.
+    pub(super) takes: Vec<ClipNotes>,
+    /// (1/s)
+    pub(super) fps: f64,
+    /// (s)
+    pub(super) duration: f64,
+}
+
+/// Simulates faces side by side and records them to `output`. Returns a report of each.
+///
+/// - `start`: puts the faces into their scenes, once the recording is open
+///
+/// # Errors
+///
+/// As [`animate`].
+pub(super) fn record_cast(
+    cast: Cast,
+    start: impl FnOnce() -> Result<Vec<Run>, Error>,
+    output: &Path,
+    options: &RecordingOptions,
+    progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
+) -> Result<Vec<AnimateReport>, Error> {
+    let wall = Instant::now();
+    let Cast {
+        infos,
+        takes,
+        fps,
+        duration,
+    } = cast;
+    let frame_count = frame_count(duration, fps);
+    let foxglove_layout = foxglove_layout(&infos.iter().collect::<Vec<_>>(), options);
+    // Opened first: it refuses a bad frame rate or folder before anything is computed.
+    let mut recorder = McapRecorder::create_with(output, infos, *options)?;
+    let recorded = start().and_then(|mut runs| {
+        record_all(&mut runs, &mut recorder, fps, frame_count, progress)?;
+        Ok(runs)
+    });
+    let runs = match recorded {
         Ok(runs) => runs,
         Err(error) => {
             recorder.discard();
             return Err(error);
         }
     };
-    let recording = recorder.finish()?;
     let whole = Whole {
         fps,
         frame_count,
+        recording: recorder.finish()?,
         wall_secs: wall.elapsed().as_secs_f64(),
-        recording,
         foxglove_layout,
     };
-    Ok(run.report(take, &whole))
+    let reports = runs.into_iter().zip(takes);
+    Ok(reports
+        .map(|(run, take)| run.report(take, &whole))
+        .collect())
 }
 
 /// What faces that were recorded together share.
-pub(super) struct Whole {
-    pub(super) fps: f64,
-    pub(super) frame_count: u64,
-    pub(super) wall_secs: f64,
-    pub(super) recording: RecordingReport,
-    pub(super) foxglove_layout: String,
+struct Whole {
+    fps: f64,
+    frame_count: u64,
+    wall_secs: f64,
+    recording: RecordingReport,
+    foxglove_layout: String,
 }
 
 /// Steps faces side by side and records every frame of each.
-pub(super) fn record_all(
+fn record_all(
     runs: &mut [Run],
     recorder: &mut McapRecorder,
     fps: f64,
@@ -246,7 +302,7 @@ impl Run {
     }
 
     /// - `take`: what reading the take had to decide
-    pub(super) fn report(mut self, take: ClipNotes, whole: &Whole) -> AnimateReport {
+    fn report(mut self, take: ClipNotes, whole: &Whole) -> AnimateReport {
         let rig = self.simulation.rig();
         let measures = self.measures;
         AnimateReport {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::animate::DEFAULT_RATE;
 use super::frames::FrameMaker;
 use super::{AnimateOptions, recording_rate};
 use crate::Error;
@@ -10,9 +11,6 @@ use crate::recording::{FrameEncoder, MessageSink, TopicInfo};
 use crate::rig::Rig;
 use crate::scene::{FrameReport, Scene, SceneError, Simulation};
 use crate::transfer::TransferError;
-
-/// Frames a second without a take that has a rate of its own. (1/s)
-const RATE_WITHOUT_TAKE: f64 = 60.0;
 
 /// A rig that plays a take over and over, or holds still, and whose weights can be set.
 ///
@@ -43,7 +41,7 @@ impl LiveFace {
         scene: Scene,
         options: &AnimateOptions,
     ) -> Result<Self, Error> {
-        let own = clip.as_ref().map_or(RATE_WITHOUT_TAKE, recording_rate);
+        let own = clip.as_ref().map_or(DEFAULT_RATE, recording_rate);
         let fps = options.fps.or(scene.fps).unwrap_or(own);
         let mut maker = FrameMaker::new(&rig, options.recording);
         let info = maker.info(&rig, clip.as_ref(), &scene, fps, options)?;

@@ -34,7 +34,9 @@ mod strain;
 mod surfaces;
 mod timing;
 
-pub use animate::{AnimateOptions, AnimateProgress, AnimateReport, animate, recording_rate};
+pub use animate::{
+    AnimateOptions, AnimateProgress, AnimateReport, animate, frame_count, recording_rate,
+};
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
 pub use expression_scans::{ExpressionScan, ScanReport};

@@ -108,7 +108,8 @@ const REST_TOLERANCE: f64 = 1e-4;
 /// is named like one, or every morph target of a glTF file.
 ///
 /// Shapes may be on another mesh of the same face, where the folder has that mesh at rest. A mesh
-/// with another number of vertices is taken for a scan with a topology of its own. A shape that comes as two halves (ICT-FaceKit's `browInnerUp_L` and `_R`) is their sum.
+/// with another number of vertices is taken for a scan with a topology of its own. A shape that
+/// comes as two halves (ICT-FaceKit's `browInnerUp_L` and `_R`) is their sum.
 ///
 /// - `source`: the folder or file
 /// - `neutral`: the face at rest

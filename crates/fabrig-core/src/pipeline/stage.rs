@@ -3,23 +3,18 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use serde::Serialize;
 
-use super::animate::{Run, Whole, record_all};
+use super::animate::{Cast, DEFAULT_RATE, Run, record_cast};
 use super::frames::FrameMaker;
 use super::{AnimateOptions, AnimateProgress, AnimateReport, recording_rate};
 use crate::Error;
 use crate::edit::{Edits, edits_path};
 use crate::facs::nearest_name;
-use crate::motion::{self, Clip, ClipNotes, ReadOptions};
-use crate::recording::{McapRecorder, foxglove_layout};
+use crate::motion::{self, Clip, ReadOptions};
 use crate::rig::Rig;
 use crate::scene::{Scene, SceneError, Simulation};
-
-/// Frames a second of a scene in which no take has a rate. (1/s)
-const RATE_WITHOUT_TAKE: f64 = 60.0;
 
 /// A face of a scene with its files read.
 #[derive(Debug, Clone)]
@@ -159,7 +154,7 @@ pub fn scene_duration(scene: &Scene, faces: &[StagedFace]) -> Result<f64, SceneE
 /// Frames a second of a scene: its own, or those of its first take that has a rate. (1/s)
 pub fn scene_rate(scene: &Scene, faces: &[StagedFace]) -> f64 {
     let of_takes = faces.iter().find_map(|face| face.rate);
-    scene.fps.or(of_takes).unwrap_or(RATE_WITHOUT_TAKE)
+    scene.fps.or(of_takes).unwrap_or(DEFAULT_RATE)
 }
 
 /// Simulates the faces of a scene side by side and records them to `output`: where there are
@@ -179,10 +174,8 @@ pub fn animate_scene(
     options: &AnimateOptions,
     progress: &mut dyn FnMut(AnimateProgress) -> ControlFlow<()>,
 ) -> Result<StageReport, Error> {
-    let wall = Instant::now();
     let fps = options.fps.unwrap_or_else(|| scene_rate(scene, &faces));
     let duration = scene_duration(scene, &faces)?;
-    let frame_count = (duration * fps + 1e-6).floor() as u64 + 1;
     let is_alone = faces.len() == 1;
     let mut infos = Vec::with_capacity(faces.len());
     let mut makers = Vec::with_capacity(faces.len());
@@ -200,35 +193,16 @@ pub fn animate_scene(
         infos.push(info);
         makers.push(maker);
     }
-    let foxglove_layout = foxglove_layout(&infos.iter().collect::<Vec<_>>(), &options.recording);
-    // Opened first: it refuses a bad frame rate or folder before anything is computed.
-    let mut recorder = McapRecorder::create_with(output, infos, options.recording)?;
     let names: Vec<String> = faces.iter().map(|face| face.name.clone()).collect();
     let notes = |face: &StagedFace| face.clip.as_ref().map(|clip| clip.notes().clone());
-    let notes: Vec<ClipNotes> = faces.iter().map(|f| notes(f).unwrap_or_default()).collect();
-    let recorded = start(faces, makers).and_then(|mut runs| {
-        record_all(&mut runs, &mut recorder, fps, frame_count, progress)?;
-        Ok(runs)
-    });
-    let runs = match recorded {
-        Ok(runs) => runs,
-        Err(error) => {
-            recorder.discard();
-            return Err(error);
-        }
-    };
-    let recording = recorder.finish()?;
-    let whole = Whole {
+    let cast = Cast {
+        infos,
+        takes: faces.iter().map(|f| notes(f).unwrap_or_default()).collect(),
         fps,
-        frame_count,
-        wall_secs: wall.elapsed().as_secs_f64(),
-        recording,
-        foxglove_layout,
+        duration,
     };
-    let reports = runs
-        .into_iter()
-        .zip(notes)
-        .map(|(run, take)| run.report(take, &whole));
+    let start = || start(faces, makers);
+    let reports = record_cast(cast, start, output, &options.recording, progress)?;
     Ok(StageReport {
         faces: names.into_iter().zip(reports).collect(),
     })

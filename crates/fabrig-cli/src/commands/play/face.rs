@@ -37,14 +37,14 @@ impl SimulatedFace {
         let name = stem(&args.input);
         let scene = scene(&args.scene)?;
         let options = AnimateOptions {
-            fps: args.scene.fps.or(scene.fps),
+            fps: args.scene.fps,
             rig_name: name.clone(),
             take_name: args.motion.as_deref().map_or_else(String::new, stem),
             recording: args.options(),
         };
         let duration = clip.as_ref().map(|clip| clip.duration());
         let face = LiveFace::new(rig, clip, scene, &options)?;
-        let round = duration.map(|secs| (secs * face.fps() + 1e-6).floor() as u64 + 1);
+        let round = duration.map(|secs| frame_count(secs, face.fps()));
         Ok(Self {
             name,
             topics: face.topics().iter().map(|topic| topic.topic).collect(),
