@@ -135,12 +135,7 @@ impl PyEdits {
     }
 
     fn __eq__(&self, other: &Self) -> bool {
-        // Wherever their file stands.
-        let text = |edits: &Self| Edits {
-            folder: PathBuf::new(),
-            ..edits.inner.clone()
-        };
-        text(self) == text(other)
+        self.inner.says_same_as(&other.inner)
     }
 
     fn __repr__(&self) -> String {

@@ -15,6 +15,7 @@ use fabrig_core::pipeline::{
 };
 use fabrig_core::recording::RecordedKind;
 use fabrig_core::rig::{Expression, SkinRefinement};
+use fabrig_core::scene::RecordingChoice;
 use fabrig_core::template::Template;
 use fabrig_core::transfer::{AlphaMode, JawMode, OffsetMode};
 use pyo3::prelude::*;
@@ -213,20 +214,6 @@ const RESOLUTIONS: [(&str, Resolution); 4] = [
     ("finest", Resolution::FINEST),
 ];
 
-const RECORDED: [(&str, RecordedKind); 11] = [
-    ("skin", RecordedKind::Skin),
-    ("patches", RecordedKind::Patches),
-    ("points", RecordedKind::Points),
-    ("magnets", RecordedKind::Magnets),
-    ("strain", RecordedKind::Strain),
-    ("contacts", RecordedKind::Contacts),
-    ("colliders", RecordedKind::Colliders),
-    ("weights", RecordedKind::Weights),
-    ("energies", RecordedKind::Energies),
-    ("errors", RecordedKind::Errors),
-    ("timings", RecordedKind::Timings),
-];
-
 /// The value that a name stands for.
 pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
     known
@@ -308,34 +295,32 @@ pub(crate) fn animate<'py>(
     layout: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    if let Some(fps) = fps
-        && !(fps.is_finite() && fps > 0.0)
-    {
-        return Err(input(format!("fps: {fps} is not a frame rate")));
-    }
+    check_rate(fps)?;
     let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
     let mut options = AnimateOptions {
-        fps: fps.or(scene.fps),
+        fps,
         ..AnimateOptions::default()
     };
     options.rig_name = rig_name.unwrap_or(options.rig_name);
     options.take_name = take_name.unwrap_or(options.take_name);
-    let mut choice = scene.recording.clone();
-    for (name, rate, value) in [
-        ("skin_hz", skin_hz, &mut choice.skin_hz),
-        ("patches_hz", patches_hz, &mut choice.patches_hz),
-        ("points_hz", points_hz, &mut choice.points_hz),
-        ("strain_hz", strain_hz, &mut choice.strain_hz),
+    for (name, rate) in [
+        ("skin_hz", skin_hz),
+        ("patches_hz", patches_hz),
+        ("points_hz", points_hz),
+        ("strain_hz", strain_hz),
     ] {
         if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate >= 0.0)) {
             return Err(input(format!("{name}: {rate} is not a rate of at least 0")));
         }
-        *value = rate.or(*value);
     }
-    if let Some(record) = record {
-        choice.record = Some(recorded(&record)?);
-    }
-    options.recording = choice.options();
+    let choice = RecordingChoice {
+        record: recorded(record.as_deref())?,
+        skin_hz,
+        patches_hz,
+        points_hz,
+        strain_hz,
+    };
+    options.recording = choice.or(&scene.recording).options();
     let mut progress = Progress::new(py, progress)?;
     let (rig, clip) = (Arc::clone(&rig.inner), clip.inner.clone());
     let report = py.detach(|| {
@@ -345,17 +330,33 @@ pub(crate) fn animate<'py>(
     });
     progress.finish()?;
     let report = report.map_err(to_py)?;
-    if let Some(path) = layout {
-        let text = report.foxglove_layout.as_bytes();
-        write_atomically(&path, |file| file.write_all(text))?;
-    }
+    write_layout(layout, &report.foxglove_layout)?;
     arrays::to_python(py, &report)
 }
 
-/// What is to be recorded, by names.
-fn recorded(names: &[String]) -> PyResult<Vec<RecordedKind>> {
-    let kinds = names.iter().map(|name| one_of("record", name, &RECORDED));
-    kinds.collect()
+/// What is to be recorded, by names; nothing said where there are none.
+fn recorded(names: Option<&[String]>) -> PyResult<Option<Vec<RecordedKind>>> {
+    let kind = |name: &String| one_of("record", name, &RecordedKind::NAMED);
+    let kinds = names.map(|names| names.iter().map(kind).collect());
+    kinds.transpose()
+}
+
+/// Frames a second that an argument asks for.
+fn check_rate(fps: Option<f64>) -> PyResult<()> {
+    match fps {
+        Some(fps) if !(fps.is_finite() && fps > 0.0) => {
+            Err(input(format!("fps: {fps} is not a frame rate")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a layout for Foxglove where one is asked for.
+fn write_layout(path: Option<PathBuf>, layout: &str) -> PyResult<()> {
+    if let Some(path) = path {
+        write_atomically(&path, |file| file.write_all(layout.as_bytes()))?;
+    }
+    Ok(())
 }
 
 /// Simulates the faces of a scene side by side and records them to one MCAP file; returns for each
@@ -382,24 +383,20 @@ pub(crate) fn animate_scene<'py>(
     layout: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
-    if let Some(fps) = fps
-        && !(fps.is_finite() && fps > 0.0)
-    {
-        return Err(input(format!("fps: {fps} is not a frame rate")));
-    }
+    check_rate(fps)?;
     let scene = self::scene(Some(scene), None, None, None, true)?;
     if scene.faces.is_empty() {
         return Err(input(
             "scene: it has no `faces`; `animate` takes a rig and a clip",
         ));
     }
-    let mut choice = scene.recording.clone();
-    if let Some(record) = record {
-        choice.record = Some(recorded(&record)?);
-    }
+    let choice = RecordingChoice {
+        record: recorded(record.as_deref())?,
+        ..scene.recording.clone()
+    };
     let options = AnimateOptions {
         fps,
-        recording: choice.options(),
+        recording: choice.or(&scene.recording).options(),
         ..AnimateOptions::default()
     };
     let mut progress = Progress::new(py, progress)?;
@@ -411,9 +408,8 @@ pub(crate) fn animate_scene<'py>(
     });
     progress.finish()?;
     let report = report.map_err(to_py)?;
-    if let (Some(path), Some((_, first))) = (layout, report.faces.first()) {
-        let text = first.foxglove_layout.as_bytes();
-        write_atomically(&path, |file| file.write_all(text))?;
+    if let Some((_, first)) = report.faces.first() {
+        write_layout(layout, &first.foxglove_layout)?;
     }
     let faces = report.faces.iter();
     faces

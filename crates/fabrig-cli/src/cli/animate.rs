@@ -127,16 +127,14 @@ impl RecordingArgs {
     /// What is written how often: as the arguments say, or else the scene.
     pub(crate) fn options(&self, of_scene: &RecordingChoice) -> RecordingOptions {
         let kinds: Vec<RecordedKind> = self.record.iter().map(|&what| what.into()).collect();
-        let choice = RecordingChoice {
-            record: Some(kinds)
-                .filter(|kinds| !kinds.is_empty())
-                .or_else(|| of_scene.record.clone()),
-            skin_hz: self.skin_hz.or(of_scene.skin_hz),
-            patches_hz: self.patches_hz.or(of_scene.patches_hz),
-            points_hz: self.points_hz.or(of_scene.points_hz),
-            strain_hz: self.strain_hz.or(of_scene.strain_hz),
+        let own = RecordingChoice {
+            record: Some(kinds).filter(|kinds| !kinds.is_empty()),
+            skin_hz: self.skin_hz,
+            patches_hz: self.patches_hz,
+            points_hz: self.points_hz,
+            strain_hz: self.strain_hz,
         };
-        choice.options()
+        own.or(of_scene).options()
     }
 }
 

@@ -340,14 +340,14 @@ impl OutputEntry {
 
     /// What is written how often: as it says, or else the scene.
     pub(super) fn recording(&self, of_scene: &RecordingChoice) -> RecordingOptions {
-        let choice = RecordingChoice {
-            record: of_scene.record.clone(),
-            skin_hz: self.skin_hz.or(of_scene.skin_hz),
-            patches_hz: self.patches_hz.or(of_scene.patches_hz),
-            points_hz: self.points_hz.or(of_scene.points_hz),
-            strain_hz: self.strain_hz.or(of_scene.strain_hz),
+        let own = RecordingChoice {
+            record: None,
+            skin_hz: self.skin_hz,
+            patches_hz: self.patches_hz,
+            points_hz: self.points_hz,
+            strain_hz: self.strain_hz,
         };
-        choice.options()
+        own.or(of_scene).options()
     }
 
     /// What of it matters for one file.

@@ -44,6 +44,8 @@ pub(super) struct Planner<'a> {
     manifest: &'a Manifest,
     out: &'a Path,
     digests: HashMap<PathBuf, Result<Digest, String>>,
+    /// Wrinkle maps by the scene file that names them.
+    maps: HashMap<PathBuf, Vec<PathBuf>>,
     jobs: Vec<PlannedJob>,
     by_output: HashMap<String, usize>,
     faces: Vec<Option<FaceSide>>,
@@ -65,10 +67,14 @@ impl<'a> Planner<'a> {
         }
         paths.extend(manifest.takes.iter().map(|take| take.file.clone()));
         let scenes = manifest.scenes.iter().filter(|scene| scene.has_file());
+        let mut maps: HashMap<PathBuf, Vec<PathBuf>> = HashMap::new();
         for scene in scenes {
-            paths.extend(maps_of(&scene.file));
+            if !maps.contains_key(&scene.file) {
+                maps.insert(scene.file.clone(), maps_of(&scene.file));
+            }
             paths.insert(scene.file.clone());
         }
+        paths.extend(maps.values().flatten().cloned());
         let digests = paths.into_par_iter().map(|path| {
             let digest =
                 digest_input(&path).map_err(|e| format!("cannot read {}: {e}", path.display()));
@@ -78,6 +84,7 @@ impl<'a> Planner<'a> {
             manifest,
             out,
             digests: digests.collect(),
+            maps,
             jobs: Vec::new(),
             by_output: HashMap::new(),
             faces: vec![None; manifest.faces.len()],
@@ -339,9 +346,9 @@ impl<'a> Planner<'a> {
         if let Some(scene) = scene {
             key = key.with_settings("scene settings", &scene.settings());
             if scene.has_file() {
-                for map in maps_of(&scene.file) {
+                for map in self.maps.get(&scene.file).into_iter().flatten() {
                     // What is wrong with a map the job says itself.
-                    let digest = self.digest(&map).unwrap_or_default();
+                    let digest = self.digest(map).unwrap_or_default();
                     key = key.with("wrinkle map", &digest);
                 }
                 match self.digest(&scene.file) {

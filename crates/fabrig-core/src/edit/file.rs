@@ -209,11 +209,16 @@ impl Edits {
 
     /// Whether nothing is edited.
     pub fn is_empty(&self) -> bool {
-        let nothing = Self {
+        self.says_same_as(&Self::default())
+    }
+
+    /// Whether both say the same, wherever their files stand.
+    pub fn says_same_as(&self, other: &Self) -> bool {
+        let elsewhere = Self {
             folder: self.folder.clone(),
-            ..Self::default()
+            ..other.clone()
         };
-        *self == nothing
+        *self == elsewhere
     }
 }
 

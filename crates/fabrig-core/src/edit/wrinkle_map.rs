@@ -12,7 +12,6 @@ use std::io::Cursor;
 use std::path::Path;
 
 use super::{EditError, WrinkleEdit};
-use crate::Point;
 use crate::anatomy::{PatchChart, PatchKind};
 use crate::cloth::NodeVariation;
 use crate::facs::nearest_name;
@@ -236,12 +235,7 @@ fn narrow_skin(rig: &mut Rig, white: &[(usize, Vec<f64>)], most: f64) -> Result<
         }
         start += patch.patch.neutral.len() as u32;
     }
-    let skin: Vec<Point> = rig
-        .face
-        .positions()
-        .iter()
-        .map(|p| rig.to_head * p)
-        .collect();
+    let skin = rig.face_in_head();
     let normals = vertex_normals(&skin, &rig.face.triangles());
     let value =
         |_: usize, patch: usize, uv: [f64; 2]| most * patches[patch].at(uv, &white[patch].1);

@@ -136,6 +136,9 @@ pub fn mirrored_shape(shape: usize) -> usize {
 }
 
 /// The candidate that is spelled most like `name`, letter case and separators aside.
+///
+/// Of those with as few letters to change, the one with more letters in common: `rame` is `frame`
+/// rather than `name`.
 pub fn nearest_name<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -145,9 +148,10 @@ pub fn nearest_name<'a>(
         .into_iter()
         .map(|candidate| {
             let spelled = Letters::new(candidate).text;
-            (strsim::damerau_levenshtein(&name, &spelled), candidate)
+            let changes = strsim::damerau_levenshtein(&name, &spelled);
+            ((changes, 1.0 - strsim::jaro(&name, &spelled)), candidate)
         })
-        .min_by_key(|&(distance, _)| distance)
+        .min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
         .map(|(_, candidate)| candidate)
 }
 

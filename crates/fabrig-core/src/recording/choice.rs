@@ -32,6 +32,23 @@ pub enum RecordedKind {
     Timings,
 }
 
+impl RecordedKind {
+    /// Each with its name in scene files, in Python and on the command line.
+    pub const NAMED: [(&'static str, Self); 11] = [
+        ("skin", Self::Skin),
+        ("patches", Self::Patches),
+        ("points", Self::Points),
+        ("magnets", Self::Magnets),
+        ("strain", Self::Strain),
+        ("contacts", Self::Contacts),
+        ("colliders", Self::Colliders),
+        ("weights", Self::Weights),
+        ("energies", Self::Energies),
+        ("errors", Self::Errors),
+        ("timings", Self::Timings),
+    ];
+}
+
 /// Rates of what is written only on request. (1/s)
 const STRAIN_HZ: f64 = 15.0;
 const MAGNETS_HZ: f64 = 10.0;

@@ -219,12 +219,17 @@ pub struct RecordingReport {
     pub topics: Vec<TopicReport>,
 }
 
+/// Whether one of several faces in a recording may be called so: its name goes into topics.
+pub(crate) fn is_name_of_several(name: &str) -> bool {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    !name.is_empty() && name.chars().all(is_plain)
+}
+
 impl RecordingInfo {
     /// Refuses what no viewer could show.
     pub(super) fn check(&self) -> Result<(), RecordingError> {
         let refuse = |reason: String| Err(RecordingError::Info { reason });
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-        if !self.face.chars().all(is_plain) {
+        if !self.face.is_empty() && !is_name_of_several(&self.face) {
             return refuse(format!(
                 "`{}` cannot be a face's name in a recording: it goes into topics, so it may have \
                  letters from a to z, digits and any of _ - . alone",

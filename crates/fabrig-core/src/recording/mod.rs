@@ -44,6 +44,7 @@ mod strain;
 pub use choice::RecordedKind;
 pub use contact::{ContactArrow, ContactFrame};
 pub use error::RecordingError;
+pub(crate) use frame::is_name_of_several;
 pub use frame::{
     Frame, LogEvent, LogLevel, RecordingInfo, RecordingOptions, RecordingReport, SurfaceInfo,
     TopicReport, UNITS_PER_MM, topics,

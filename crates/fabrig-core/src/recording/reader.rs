@@ -87,13 +87,12 @@ impl RecordingReader {
     /// As [`Self::open`], but for several faces.
     pub fn open_all(path: impl AsRef<Path>) -> Result<Vec<Self>, RecordingError> {
         let path = path.as_ref();
-        match Self::open(path) {
-            Err(RecordingError::SeveralFaces { faces, .. }) => {
-                let names = faces.split(", ");
-                names.map(|face| Self::open_face(path, face)).collect()
-            }
-            other => other.map(|reader| vec![reader]),
+        let first = Self::begin(path, false)?;
+        if first.faces().next().is_none() {
+            return Ok(vec![first]);
         }
+        let faces = first.faces();
+        faces.map(|face| Self::open_face(path, face)).collect()
     }
 
     /// Name of the face that is read; empty where the recording has one alone.
@@ -119,7 +118,8 @@ impl RecordingReader {
         Self::start(path.as_ref(), true, Some(face))
     }
 
-    fn start(path: &Path, is_recovering: bool, face: Option<&str>) -> Result<Self, RecordingError> {
+    /// Reads what a recording says of itself, and no face yet.
+    fn begin(path: &Path, is_recovering: bool) -> Result<Self, RecordingError> {
         let file = File::open(path).map_err(|source| RecordingError::Io {
             action: "open",
             path: path.to_owned(),
@@ -137,7 +137,7 @@ impl RecordingReader {
             is_recovering,
             is_done: false,
             metadata: BTreeMap::new(),
-            face: face.unwrap_or_default().to_owned(),
+            face: String::new(),
             topics: HashMap::new(),
             pending: None,
             frames: 0,
@@ -150,6 +150,13 @@ impl RecordingReader {
                 });
             }
         }
+        Ok(reader)
+    }
+
+    /// Begins, and chooses the face.
+    fn start(path: &Path, is_recovering: bool, face: Option<&str>) -> Result<Self, RecordingError> {
+        let mut reader = Self::begin(path, is_recovering)?;
+        reader.face = face.unwrap_or_default().to_owned();
         let known: Vec<&str> = reader.faces().collect();
         if known.contains(&reader.face.as_str()) || known.is_empty() && face.is_none() {
             return Ok(reader);

@@ -109,6 +109,18 @@ pub struct RecordingChoice {
 }
 
 impl RecordingChoice {
+    /// This choice, and what it leaves open as `other` says.
+    #[must_use]
+    pub fn or(self, other: &Self) -> Self {
+        Self {
+            record: self.record.or_else(|| other.record.clone()),
+            skin_hz: self.skin_hz.or(other.skin_hz),
+            patches_hz: self.patches_hz.or(other.patches_hz),
+            points_hz: self.points_hz.or(other.points_hz),
+            strain_hz: self.strain_hz.or(other.strain_hz),
+        }
+    }
+
     /// What is written how often.
     pub fn options(&self) -> RecordingOptions {
         let mut options = RecordingOptions::default();

@@ -401,10 +401,7 @@ impl Simulation {
     ///
     /// If there is no such patch.
     pub fn patch_positions(&self, patch: usize) -> &[Point3<f32>] {
-        match (&self.cloth, self.modelled.cloth_of(patch)) {
-            (Some(cloth), Some(own)) => cloth.positions(own),
-            _ => &self.targets[patch].positions,
-        }
+        positions_of(patch, self.cloth.as_ref(), &self.modelled, &self.targets)
     }
 
     /// Where the muscle shapes want the nodes of a patch now. [mm, head frame]
@@ -492,10 +489,7 @@ impl Simulation {
 
     fn move_skin(&mut self) -> Result<(), SceneError> {
         let nodes: Vec<&[Point3<f32>]> = (0..self.targets.len())
-            .map(|patch| match (&self.cloth, self.modelled.cloth_of(patch)) {
-                (Some(cloth), Some(own)) => cloth.positions(own),
-                _ => self.targets[patch].positions.as_slice(),
-            })
+            .map(|p| positions_of(p, self.cloth.as_ref(), &self.modelled, &self.targets))
             .collect();
         let mandible = self.rig.mandible(&self.pose.weights);
         self.deformer
@@ -580,6 +574,19 @@ pub fn cloth_patches(rig: &Rig) -> Result<Vec<ClothPatch>, SceneError> {
             })
         })
         .collect()
+}
+
+/// Where the nodes of a patch are: its cloth's, or where its muscle shapes want them.
+fn positions_of<'a>(
+    patch: usize,
+    cloth: Option<&'a Cloth>,
+    modelled: &Modelled,
+    targets: &'a [PatchMotion],
+) -> &'a [Point3<f32>] {
+    match (cloth, modelled.cloth_of(patch)) {
+        (Some(cloth), Some(own)) => cloth.positions(own),
+        _ => &targets[patch].positions,
+    }
 }
 
 fn to_cloth_attachment(attachment: &Attachment) -> ClothAttachment {

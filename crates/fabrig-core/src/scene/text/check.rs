@@ -5,21 +5,18 @@ use std::ops::Range;
 
 use super::node::{Entry, Node, Value, line_and_column};
 use super::schema::{JOIN, Key, Kind, SCENE};
+use crate::facs::nearest_name;
 use crate::scene::{Hint, SceneError, TextPlace};
 
-/// A text that keeps to the schema.
-#[derive(Debug)]
-pub(super) struct Checked {
-    /// Where the value of each key stands, by path.
-    pub(super) places: BTreeMap<String, TextPlace>,
-}
-
-/// Checks the tree of a scene.
+/// Checks the tree of a scene. Returns where the value of each key stands, by path.
 ///
 /// # Errors
 ///
 /// The first thing that is wrong, in the order of the text.
-pub(super) fn check_scene(node: &Node, text: Option<&str>) -> Result<Checked, SceneError> {
+pub(super) fn check_scene(
+    node: &Node,
+    text: Option<&str>,
+) -> Result<BTreeMap<String, TextPlace>, SceneError> {
     let mut walk = Walk {
         text,
         places: BTreeMap::new(),
@@ -28,9 +25,7 @@ pub(super) fn check_scene(node: &Node, text: Option<&str>) -> Result<Checked, Sc
         Value::Table(entries) => walk.table(entries, SCENE, "", node)?,
         _ => return Err(walk.wrong(node, "a scene", "a table of keys".to_owned(), None)),
     }
-    Ok(Checked {
-        places: walk.places,
-    })
+    Ok(walk.places)
 }
 
 struct Walk<'a> {
@@ -56,6 +51,17 @@ impl Walk<'_> {
         }
     }
 
+    /// A key that a table needs and has not.
+    fn missing(&self, table: &Node, path: &str, expected: String) -> SceneError {
+        SceneError::Value {
+            place: self.place(table.span.as_ref()),
+            key: path.into(),
+            expected: expected.into(),
+            found: "nothing".into(),
+            hint: Hint(None),
+        }
+    }
+
     fn table(
         &mut self,
         entries: &[Entry],
@@ -72,13 +78,7 @@ impl Walk<'_> {
         }
         let is_there = |key: &&Key| entries.iter().any(|entry| entry.name == key.name);
         match keys.iter().find(|key| key.is_required && !is_there(key)) {
-            Some(missing) => Err(SceneError::Value {
-                place: self.place(node.span.as_ref()),
-                key: join(path, missing.name).into(),
-                expected: missing.kind.in_words().into(),
-                found: "nothing".into(),
-                hint: Hint(None),
-            }),
+            Some(key) => Err(self.missing(node, &join(path, key.name), key.kind.in_words())),
             None => Ok(()),
         }
     }
@@ -219,13 +219,7 @@ impl Walk<'_> {
         if entries.iter().any(|entry| entry.name == "keys") {
             return Ok(());
         }
-        Err(SceneError::Value {
-            place: self.place(node.span.as_ref()),
-            key: join(path, "keys").into(),
-            expected: Kind::Keys(&[]).in_words().into(),
-            found: "nothing".into(),
-            hint: Hint(None),
-        })
+        Err(self.missing(node, &join(path, "keys"), Kind::Keys(&[]).in_words()))
     }
 
     /// At least one key, each later than the one before.
@@ -277,13 +271,7 @@ impl Walk<'_> {
             if let Some(entry) = entries.iter().find(|e| !known.contains(&e.name.as_str())) {
                 return Err(self.unknown(entry, known.into_iter(), path));
             }
-            return Err(SceneError::Value {
-                place: self.place(node.span.as_ref()),
-                key: own.into(),
-                expected: kind.in_words().into(),
-                found: "nothing".into(),
-                hint: Hint(None),
-            });
+            return Err(self.missing(node, &own, kind.in_words()));
         };
         let names = variants.iter().map(|(name, _)| *name);
         let variant = match &tag.node.value {
@@ -317,22 +305,6 @@ const TIME: Kind = Kind::Number {
     low: -1e6,
     high: 1e6,
 };
-
-/// The name that is spelled most like one that is not known.
-///
-/// Of those with as few letters to change, the one with more letters in common: `rame` is
-/// `frame` rather than `name`.
-fn nearest_name<'a>(found: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let found = found.to_lowercase();
-    let unlike = |name: &str| {
-        let letters = strsim::damerau_levenshtein(&found, name);
-        (letters, 1.0 - strsim::jaro(&found, name))
-    };
-    known
-        .map(|name| (unlike(name), name))
-        .min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
-        .map(|(_, name)| name)
-}
 
 fn number(value: &Value) -> Option<f64> {
     match value {

@@ -12,26 +12,23 @@ mod source;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 pub use show::annotated_scene;
 pub use source::SceneSource;
 
 use super::{Scene, SceneError, TextPlace};
-use check::{Checked, check_scene};
+use crate::recording::is_name_of_several;
+use check::check_scene;
 use node::{Node, line_and_column};
 
 /// - `folder`: where files are that the text names
 pub(super) fn from_toml(text: &str, folder: &Path) -> Result<Scene, SceneError> {
     let node = Node::of_toml(text)?;
-    let checked = check_scene(&node, Some(text))?;
-    let scene = toml::from_str(text).map_err(|error| SceneError::Text {
-        place: error
-            .span()
-            .map_or_else(TextPlace::default, |span| line_and_column(text, span.start)),
-        reason: one_line(error.message()),
-    })?;
-    finish(scene, checked, folder)
+    let places = check_scene(&node, Some(text))?;
+    let scene = toml::from_str(text).map_err(|error| no_toml(text, &error))?;
+    finish(scene, places, folder)
 }
 
 pub(super) fn from_json(text: &str) -> Result<Scene, SceneError> {
@@ -41,14 +38,18 @@ pub(super) fn from_json(text: &str) -> Result<Scene, SceneError> {
     };
     let value: serde_json::Value = serde_json::from_str(text).map_err(failed)?;
     let node = Node::of_json(&value);
-    let checked = check_scene(&node, None)?;
+    let places = check_scene(&node, None)?;
     let scene = serde_json::from_value(value).map_err(failed)?;
-    finish(scene, checked, Path::new(""))
+    finish(scene, places, Path::new(""))
 }
 
 /// What the schema cannot say: what options, colliders and names must be among each other.
-fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, SceneError> {
-    scene.source = SceneSource::new(folder, checked.places);
+fn finish(
+    mut scene: Scene,
+    places: BTreeMap<String, TextPlace>,
+    folder: &Path,
+) -> Result<Scene, SceneError> {
+    scene.source = SceneSource::new(folder, places);
     let source = &scene.source;
     scene
         .contact
@@ -67,11 +68,9 @@ fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, Sc
             None,
         ));
     }
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
     for (index, face) in scene.faces.iter().enumerate() {
         let name = face.display_name();
-        let is_unfit = name.is_empty() || !name.chars().all(is_plain);
-        if scene.faces.len() > 1 && is_unfit {
+        if scene.faces.len() > 1 && !is_name_of_several(&name) {
             return Err(source.value(
                 &format!("faces[{index}].name"),
                 "letters from a to z, digits and any of _ - . alone, as it goes into topics"
@@ -111,6 +110,15 @@ fn finish(mut scene: Scene, checked: Checked, folder: &Path) -> Result<Scene, Sc
             .collect(),
     )?;
     Ok(scene)
+}
+
+/// Where and why a text is no TOML, or no scene.
+fn no_toml(text: &str, error: &toml::de::Error) -> SceneError {
+    let span = error.span();
+    SceneError::Text {
+        place: span.map_or_else(TextPlace::default, |span| line_and_column(text, span.start)),
+        reason: one_line(error.message()),
+    }
 }
 
 fn one_line(text: &str) -> String {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
-use super::{SceneError, TextPlace, one_line};
+use super::{SceneError, TextPlace, no_toml};
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
@@ -39,12 +39,7 @@ pub(super) struct Entry {
 
 impl Node {
     pub(super) fn of_toml(text: &str) -> Result<Self, SceneError> {
-        let document = DeTable::parse(text).map_err(|error| SceneError::Text {
-            place: error
-                .span()
-                .map_or_else(TextPlace::default, |span| line_and_column(text, span.start)),
-            reason: one_line(error.message()),
-        })?;
+        let document = DeTable::parse(text).map_err(|error| no_toml(text, &error))?;
         Ok(Self {
             span: None,
             value: of_table(document.get_ref()),

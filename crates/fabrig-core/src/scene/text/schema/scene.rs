@@ -3,6 +3,7 @@
 use super::cloth::{CLOTH, CONTACT, MATERIAL, WRINKLES};
 use super::world::{COLLIDER, FORCE, SHAKE, TURBULENCE};
 use super::{Key, Kind, NAMES, PLACE, RATE, TIME, from_to, positive, vector};
+use crate::recording::RecordedKind;
 
 pub(in crate::scene::text) const SCENE: &[Key] = &[
     Key::new(
@@ -128,22 +129,21 @@ pub(super) const SIMULATE: &[Key] = &[
     Key::new("except", NAMES, "and not these"),
 ];
 
+/// Names of what can be recorded.
+const RECORDED: [&str; RecordedKind::NAMED.len()] = {
+    let mut names = [""; RecordedKind::NAMED.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = RecordedKind::NAMED[i].0;
+        i += 1;
+    }
+    names
+};
+
 pub(super) const RECORDING: &[Key] = &[
     Key::optional(
         "record",
-        Kind::List(&Kind::Word(&[
-            "skin",
-            "patches",
-            "points",
-            "magnets",
-            "strain",
-            "contacts",
-            "colliders",
-            "weights",
-            "energies",
-            "errors",
-            "timings",
-        ])),
+        Kind::List(&Kind::Word(&RECORDED)),
         "only these; all but magnets, strain and timings where left out",
         "[\"skin\", \"weights\"]",
     ),
