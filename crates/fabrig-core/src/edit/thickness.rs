@@ -53,12 +53,7 @@ pub(super) fn thicken(rig: &mut Rig, pads: &[(usize, f64)]) -> Result<(), EditEr
         });
         lifts.collect::<Vec<f64>>()
     };
-    let skin: Vec<Point> = rig
-        .face
-        .positions()
-        .iter()
-        .map(|p| rig.to_head * p)
-        .collect();
+    let skin = rig.face_in_head();
     let normals = vertex_normals(&skin, &rig.face.triangles());
     let is_skin = |v: usize| rig.regions.get(v).is_some_and(Option::is_some);
     let lifts = carry(&skin, &normals, &is_skin);

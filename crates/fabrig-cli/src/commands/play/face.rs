@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use anyhow::Result;
-use fabrig_core::pipeline::{AnimateOptions, LiveFace};
+use fabrig_core::pipeline::{AnimateOptions, LiveFace, frame_count};
 
 use super::Source;
 use super::parameters::Change;
