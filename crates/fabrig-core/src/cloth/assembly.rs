@@ -95,7 +95,7 @@ fn link_pairs(
     layout: &[PatchLayout],
     groups: &mut [Box<dyn PatchGroup>],
 ) -> bool {
-    /// A node of a pair: group, node, lane. Ports are in this order, that of memory.
+    /// A node of a pair: group, node, lane.
     type End = (usize, u32, u32);
     let end = |patch: usize, node: u32| -> End {
         let at = &layout[patch];
@@ -120,15 +120,20 @@ fn link_pairs(
             }
         }
     }
-    let mut ports: BTreeMap<End, usize> = BTreeMap::new();
+    let mut counts: BTreeMap<End, usize> = BTreeMap::new();
     for &(a, b, _) in &pairs {
-        ports.insert(a, 0);
-        ports.insert(b, 0);
+        *counts.entry(a).or_default() += 1;
+        *counts.entry(b).or_default() += 1;
     }
+    // Those with equally many pairs follow each other, so that the processor can tell where a
+    // row of partners ends; among them they are in the order of memory.
+    let mut ends: Vec<End> = counts.keys().copied().collect();
+    ends.sort_by_key(|end| counts[end]);
+    let mut ports: BTreeMap<End, usize> = BTreeMap::new();
     let mut lists = vec![GroupPairs::default(); groups.len()];
-    for (&(group, node, lane), port) in &mut ports {
+    for (group, node, lane) in ends {
         let list = &mut lists[group];
-        *port = list.nodes.len();
+        ports.insert((group, node, lane), list.nodes.len());
         list.nodes.push((node, lane));
         list.partners.push(Vec::new());
     }

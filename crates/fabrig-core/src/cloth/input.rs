@@ -108,7 +108,7 @@ pub struct ClothOptions {
 impl Default for ClothOptions {
     fn default() -> Self {
         Self {
-            substeps: 8,
+            substeps: 9,
             rest_blend: 0.9,
             rest_imperfection: 0.02,
             seed: 0,

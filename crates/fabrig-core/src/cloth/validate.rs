@@ -252,12 +252,9 @@ fn motion(
     }
     let (positions, velocities) = (&motion.positions, &motion.velocities);
     // All in one go, without branches; only where something is wrong it is looked for.
-    let is_sound = positions
-        .iter()
-        .map(|p| all_within(p.coords.as_ref(), FARTHEST))
-        .chain(velocities.iter().map(|v| all_within(v.as_ref(), FASTEST)))
-        .fold(true, |all, one| all & one);
-    if is_sound {
+    let farthest = largest_bits(positions.iter().map(|p| p.coords.as_ref()));
+    let fastest = largest_bits(velocities.iter().map(|v| v.as_ref()));
+    if farthest <= FARTHEST.to_bits() && fastest <= FASTEST.to_bits() {
         return Ok(());
     }
     values(
@@ -274,10 +271,16 @@ fn motion(
     )
 }
 
-/// Whether no number is beyond `limit` in size; false for NaN.
+/// Bits of the largest size of any number: ordered as sizes are, NaN beyond all of them.
 #[inline(always)]
-fn all_within(v: &[f32; 3], limit: f32) -> bool {
-    (v[0].abs() <= limit) & (v[1].abs() <= limit) & (v[2].abs() <= limit)
+fn largest_bits<'a>(vectors: impl Iterator<Item = &'a [f32; 3]>) -> u32 {
+    let mut largest = [0; 3];
+    for v in vectors {
+        for axis in 0..3 {
+            largest[axis] = largest[axis].max(v[axis].abs().to_bits());
+        }
+    }
+    largest[0].max(largest[1]).max(largest[2])
 }
 
 fn values(

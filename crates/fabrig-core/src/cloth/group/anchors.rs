@@ -16,8 +16,9 @@ pub(super) struct Anchor<R> {
     indices: Vec<u32>,
     /// k, 0 in lanes without. [mass/s^2]
     pub(super) stiffness: R,
-    /// Position at the start and at the end of the frame. [mm, relative to the patch's centre]
-    start: Vec3<R>,
+    /// Position at the end of the substep, or at the start of the frame before there is one, and
+    /// at the end of the frame. [mm, relative to the patch's centre]
+    now: Vec3<R>,
     end: Vec3<R>,
     /// Hermite segment of the frame: chord, slopes at the start and at the end. (mm)
     segment: [Vec3<R>; 3],
@@ -65,7 +66,7 @@ impl<R: Real> Anchor<R> {
             node,
             indices: vec![NONE; R::LANES],
             stiffness: R::splat(0.0),
-            start: rest,
+            now: rest,
             end: rest,
             segment: [Vec3::zero(); 3],
             velocity: Vec3::zero(),
@@ -78,7 +79,7 @@ impl<R: Real> Anchor<R> {
         let had_velocity = std::mem::take(&mut self.has_velocity[lane]);
         let index = self.indices[lane] as usize;
         let start = self.end.lane(lane);
-        self.start.set_lane(lane, start);
+        self.now.set_lane(lane, start);
         let Some(motion) = motion else {
             for part in &mut self.segment {
                 part.set_lane(lane, [0.0; 3]);
@@ -119,12 +120,25 @@ impl<R: Real> Group<R> {
         }
     }
 
+    /// Moves the anchors through a substep.
+    ///
+    /// - `step`: Hermite weights, as for the targets, so that equal motion is exactly equal
+    #[inline(always)]
+    pub(super) fn move_anchors(&mut self, [chord, start, end]: [R; 3]) {
+        for anchor in &mut self.anchors {
+            let [c, a, b] = anchor.segment;
+            anchor.now += c * chord + a * start + b * end;
+        }
+    }
+
     /// Draws anchored nodes to their anchors.
     #[inline(always)]
     pub(super) fn pull_to_anchors(&mut self) {
         for k in 0..self.anchors.len() {
             let (node, stiffness) = (self.anchors[k].node, self.anchors[k].stiffness);
-            let pull = anchor_pull(self.anchor_offset(k), stiffness, self.h_e);
+            // From x_b, where the rest of the prediction stands.
+            let offset = self.anchor_offset(k) - self.past[node];
+            let pull = anchor_pull(offset, stiffness, self.h_e);
             let w = self.inv_masses[node];
             self.solution[node] += pull * w;
         }
@@ -150,10 +164,7 @@ impl<R: Real> Group<R> {
     #[inline(always)]
     fn anchor_offset(&self, index: usize) -> Vec3<R> {
         let anchor = &self.anchors[index];
-        let [chord, start, end] = self.weights[1].map(R::splat);
-        let [c, a, b] = anchor.segment;
-        // As the target is computed, so that equal motion gives exactly zero.
-        anchor.start + (c * chord + a * start + b * end) - self.targets[anchor.node]
+        anchor.now - self.targets[anchor.node]
     }
 
     /// Energy of all anchors at the end of the frame, and what they would have on the target.
@@ -162,7 +173,7 @@ impl<R: Real> Group<R> {
         let mut sums = [R::splat(0.0); 2];
         for anchor in &self.anchors {
             let half = R::splat(0.5) * anchor.stiffness;
-            let away = anchor.start + anchor.segment[0] - self.ends[anchor.node];
+            let away = anchor.end - self.ends[anchor.node];
             let gap = self.displacements[anchor.node] - away;
             sums[0] += half * gap.dot(gap);
             sums[1] += half * away.dot(away);

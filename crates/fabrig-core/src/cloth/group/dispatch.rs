@@ -21,7 +21,7 @@ impl<R: Real> PatchGroup for Group<R> {
     }
 
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
-        self.starts.copy_from_slice(&self.ends);
+        std::mem::swap(&mut self.targets, &mut self.ends);
         vectorized(LoadEnds(self, (1.0, targets)));
         self.load_anchors(1.0, anchors);
         vectorized(BeginFrame(self, 1.0));
@@ -43,21 +43,12 @@ impl<R: Real> PatchGroup for Group<R> {
 
     fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]) {
         let inv = R::splat(dt);
-        self.starts.copy_from_slice(&self.ends);
+        // The frame starts where the last one ended; the new ends replace all of the old targets.
+        std::mem::swap(&mut self.targets, &mut self.ends);
         for (slope, v) in self.start_slopes.iter_mut().zip(&self.end_velocities) {
             *slope = *v * inv;
         }
-        let had_velocity: Vec<bool> = self.lane_states.iter().map(|s| s.has_velocity).collect();
         vectorized(LoadEnds(self, (dt, targets)));
-        for lane in 0..R::LANES {
-            // After a straight segment nothing is known about the velocity here.
-            if !had_velocity[lane] {
-                for i in 0..self.starts.len() {
-                    let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
-                    self.start_slopes[i].set_lane(lane, [0, 1, 2].map(|k| b[k] - a[k]));
-                }
-            }
-        }
         self.load_anchors(dt, anchors);
         self.clamped = R::splat(0.0);
         vectorized(BeginFrame(self, dt));

@@ -1,12 +1,14 @@
 //! The ends of a frame: targets and anchors in, energies out.
 
+use nalgebra::Vector3;
+
 use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, bend_energy};
 use crate::cloth::constraints::pressure::swept_volume;
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
 use crate::cloth::input::PatchMotion;
-use crate::cloth::lanes::Real;
+use crate::cloth::lanes::{Real, Vec3};
 
 impl<R: Real> Group<R> {
     /// Patch of a lane; lanes to spare repeat the last one.
@@ -15,39 +17,32 @@ impl<R: Real> Group<R> {
     }
 
     /// Loads target ends into the lanes. Straight motion is marked by lane.
+    ///
+    /// Where a frame starts after straight motion, nothing is known about the velocity there, so
+    /// that the chord is its slope too.
     #[inline(always)]
     pub(super) fn load_ends_lanes(&mut self, dt: f64, targets: &[PatchMotion]) {
         let motions: Vec<&PatchMotion> = (0..R::LANES)
             .map(|lane| &targets[self.patch_of(lane)])
             .collect();
-        for (lane, motion) in motions.iter().enumerate() {
-            for (end, p) in self.ends.iter_mut().zip(&motion.positions) {
-                end.x.load_lane(lane, p.x);
-                end.y.load_lane(lane, p.y);
-                end.z.load_lane(lane, p.z);
-            }
-        }
-        for end in &mut self.ends {
-            *end -= self.origin;
-        }
+        let origin = self.origin;
+        let positions = motions.iter().map(|m| m.positions.as_slice());
+        interleave(&mut self.ends, positions, |p| &p.coords, |end| end - origin);
         let has_velocity = |lane: usize| !motions[lane].velocities.is_empty();
-        for (lane, motion) in motions.iter().enumerate() {
-            for (slope, v) in self.end_slopes.iter_mut().zip(&motion.velocities) {
-                slope.x.load_lane(lane, v.x);
-                slope.y.load_lane(lane, v.y);
-                slope.z.load_lane(lane, v.z);
-            }
-        }
         let step = R::splat(dt);
-        for slope in &mut self.end_slopes {
-            *slope = *slope * step;
-        }
-        for lane in (0..R::LANES).filter(|&lane| !has_velocity(lane)) {
-            for (i, slope) in self.end_slopes.iter_mut().enumerate() {
-                let (a, b) = (self.starts[i].lane(lane), self.ends[i].lane(lane));
-                slope.set_lane(lane, [0, 1, 2].map(|axis| b[axis] - a[axis]));
-            }
-        }
+        let velocities = motions.iter().map(|m| m.velocities.as_slice());
+        interleave(
+            &mut self.end_slopes,
+            velocities,
+            |v| v,
+            |slope| slope * step,
+        );
+        let (targets, ends) = (&self.targets, &self.ends);
+        straighten(&mut self.end_slopes, targets, ends, has_velocity);
+        let states = &self.lane_states;
+        straighten(&mut self.start_slopes, targets, ends, |lane| {
+            states[lane].has_velocity
+        });
         for lane in 0..R::LANES {
             self.lane_states[lane].has_velocity = has_velocity(lane);
         }
@@ -63,7 +58,7 @@ impl<R: Real> Group<R> {
         let inv_dt2 = inv_dt * inv_dt;
         let (mut jerk, mut jump) = (R::splat(0.0), R::splat(0.0));
         for i in 0..self.ends.len() {
-            let chord = self.ends[i] - self.starts[i];
+            let chord = self.ends[i] - self.targets[i];
             let (a, b) = (self.start_slopes[i], self.end_slopes[i]);
             self.chords[i] = chord;
             let first = (chord * six - a * four - b * two) * inv_dt2;
@@ -156,5 +151,56 @@ impl<R: Real> Group<R> {
             self.target_steps[i].set_lane(lane, [0.0; 3]);
         }
         self.lane_states[lane].has_history = false;
+    }
+}
+
+/// Makes chords the slopes of those lanes whose velocity is not known.
+#[inline(always)]
+fn straighten<R: Real>(
+    slopes: &mut [Vec3<R>],
+    starts: &[Vec3<R>],
+    ends: &[Vec3<R>],
+    is_known: impl Fn(usize) -> bool,
+) {
+    let chords = starts.iter().zip(ends).map(|(a, b)| *b - *a);
+    let unknown: Vec<usize> = (0..R::LANES).filter(|&lane| !is_known(lane)).collect();
+    if unknown.len() == R::LANES {
+        for (slope, chord) in slopes.iter_mut().zip(chords) {
+            *slope = chord;
+        }
+    } else if !unknown.is_empty() {
+        for (slope, chord) in slopes.iter_mut().zip(chords) {
+            for &lane in &unknown {
+                slope.set_lane(lane, chord.lane(lane));
+            }
+        }
+    }
+}
+
+/// Nodes that are interleaved at once, so that they stay in the nearest cache.
+const TILE: usize = 32;
+
+/// Loads one list of vectors into each lane, and then does something to all lanes. Lanes whose
+/// list is empty keep what they have.
+#[inline(always)]
+fn interleave<'a, R: Real, T: 'a>(
+    nodes: &mut [Vec3<R>],
+    lanes: impl Iterator<Item = &'a [T]> + Clone,
+    vector: impl Fn(&T) -> &Vector3<f32>,
+    finish: impl Fn(Vec3<R>) -> Vec3<R>,
+) {
+    for (tile, nodes) in nodes.chunks_mut(TILE).enumerate() {
+        for (lane, values) in lanes.clone().enumerate() {
+            let values = values.get(tile * TILE..).unwrap_or_default();
+            for (node, value) in nodes.iter_mut().zip(values) {
+                let v = vector(value);
+                node.x.load_lane(lane, v.x);
+                node.y.load_lane(lane, v.y);
+                node.z.load_lane(lane, v.z);
+            }
+        }
+        for node in nodes {
+            *node = finish(*node);
+        }
     }
 }

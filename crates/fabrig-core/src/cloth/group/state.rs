@@ -79,8 +79,6 @@ pub(crate) struct Group<R> {
     /// How far the targets moved in the last substep of the frame before. (mm)
     pub(super) target_steps: Vec<Vec3<R>>,
 
-    /// Targets at the start of the frame, relative to the centre. (mm)
-    pub(super) starts: Vec<Vec3<R>>,
     /// Hermite segments: chord, slope at the start and at the end, times dt. (mm)
     pub(super) chords: Vec<Vec3<R>>,
     pub(super) start_slopes: Vec<Vec3<R>>,
@@ -92,7 +90,8 @@ pub(crate) struct Group<R> {
     /// Targets at the end of the frame as given. [mm, head frame]
     pub(super) end_positions: Vec<Vec<Point3<f32>>>,
 
-    /// Targets at the end of the substep, relative to the centre. (mm)
+    /// Targets at the end of the substep, or at the start of the frame before there is one,
+    /// relative to the centre. (mm)
     pub(super) targets: Vec<Vec3<R>>,
     /// Displacements, then positions, that are being solved for. (mm)
     pub(super) solution: Vec<Vec3<R>>,
@@ -250,7 +249,6 @@ impl<R: Real> Group<R> {
             velocities: zero.clone(),
             previous_velocities: zero.clone(),
             target_steps: zero.clone(),
-            starts: rest.clone(),
             chords: zero.clone(),
             start_slopes: zero.clone(),
             end_slopes: zero.clone(),

@@ -73,11 +73,8 @@ struct Prediction<R> {
     /// Added masses that draw to X, and to X + u_b. [mass]
     pull: R,
     follow: R,
-    /// What an anchor's stiffness counts with. [s^2]
-    anchored: R,
-    /// Hermite weights of the target, of its step now, of its step before where that was in the
+    /// Hermite weights of the target's step now, of its step before where that was in the
     /// same frame, and of u_b - x_b: the step less what history takes of the one before.
-    target: [R; 3],
     step: [R; 3],
     last_step: [R; 3],
     drift: [R; 3],
@@ -85,6 +82,11 @@ struct Prediction<R> {
 
 /// Acceleration of the nodes. (mm/s^2)
 trait Field<R> {
+    /// The acceleration, where all nodes have the same.
+    fn uniform(&self) -> Option<Vec3<R>> {
+        None
+    }
+
     /// Of node `i`, expected at `x` (mm, relative to the centre) with velocity `v` (mm/s).
     fn at(&self, i: usize, x: Vec3<R>, v: Vec3<R>) -> Vec3<R>;
 }
@@ -99,6 +101,11 @@ struct Turning<R>(FrameForces<R>);
 struct Windy<'a, R>(Turning<R>, &'a [Vec3<R>]);
 
 impl<R: Real> Field<R> for Uniform<R> {
+    #[inline(always)]
+    fn uniform(&self) -> Option<Vec3<R>> {
+        Some(self.0)
+    }
+
     #[inline(always)]
     fn at(&self, _: usize, _: Vec3<R>, _: Vec3<R>) -> Vec3<R> {
         self.0
@@ -177,16 +184,13 @@ impl<R: Real> Group<R> {
                 R::splat(b[2] - a[2]),
             ]
         };
-        let after = self.weights[1];
         let is_folded = if self.mode == Mode::Paper { 0.0 } else { 1.0 };
         let (step, last_step) = (difference(self.weights), difference(last));
         Prediction {
             history,
             h_e,
             pull: self.magnet.stiffness * (h_e * h_e) * R::splat(is_folded),
-            anchored: h_e * h_e * R::splat(is_folded),
             follow: self.magnet.past_mass(self.mass, h_e),
-            target: [R::splat(after[0]), R::splat(after[1]), R::splat(after[2])],
             step,
             last_step,
             drift: std::array::from_fn(|k| step[k] - last_step[k] * history),
@@ -289,6 +293,7 @@ impl<R: Real> Group<R> {
         } else {
             self.predict_in::<IS_TURN, _>(&Uniform(Vec3::splat(substep.uniform)), p)
         };
+        self.move_anchors(p.step);
         if self.mode != Mode::Paper {
             self.pull_to_anchors();
         }
@@ -307,8 +312,8 @@ impl<R: Real> Group<R> {
             start_slopes: &self.start_slopes[..n],
             end_slopes: &self.end_slopes[..n],
         };
-        let (starts, inv_masses) = (&self.starts[..n], &self.inv_masses[..n]);
-        let anchors = &self.anchor_stiffness[..n];
+        let inv_masses = &self.inv_masses[..n];
+        let is_damped = self.has_stretch_damping;
         let previous_us = &self.previous_displacements[..n];
         let previous_vs = &self.previous_velocities[..n];
         let target_steps = &self.target_steps[..n];
@@ -347,7 +352,7 @@ impl<R: Real> Group<R> {
                 };
                 drift = segments.weighted(i, p.step) - target_steps[i] * p.history;
             }
-            let target = starts[i] + segments.weighted(i, p.target);
+            let target = targets[i] + segments.weighted(i, p.step);
             // As u + g (u - u'): weights that are rounded to a sum other than 1 would be a force.
             let change = m.u - m.previous_u;
             let ub = m.u + change * p.history;
@@ -355,19 +360,25 @@ impl<R: Real> Group<R> {
             let gain = m.v - m.previous_v;
             let vb = m.v + gain * p.history;
             let acceleration = field.at(i, target + m.u + change, m.v + gain);
-            squared += acceleration.dot(acceleration);
+            if field.uniform().is_none() {
+                squared += acceleration.dot(acceleration);
+            }
             // The mass-weighted mean of y, x_b, X + u_b and X, as a change of x_b: the rounding
             // of the weights' sum then does not act on x_b.
             let coasting = vb * p.h_e + acceleration * h_e2;
-            let draw = p.pull + anchors[i] * p.anchored;
-            let top = coasting * self.mass + drift * p.follow - xb * draw;
+            let top = coasting * self.mass + drift * p.follow - xb * p.pull;
             targets[i] = target;
             pasts[i] = xb;
-            restings[i] = target + ub;
+            if is_damped {
+                restings[i] = target + ub;
+            }
             solution[i] = xb + top * inv_masses[i];
         }
         self.clamped = clamp.count;
-        squared
+        match field.uniform() {
+            Some(a) => a.dot(a) * R::splat(n as f64),
+            None => squared,
+        }
     }
 
     /// Hermite segments of the frame.
@@ -383,13 +394,11 @@ impl<R: Real> Group<R> {
     /// What the wind does to every node where it is expected after `horizon` (s).
     #[inline(always)]
     fn evaluate_wind(&mut self, substep: &Substep, horizon: f64) {
-        let now = self.weights[0];
-        let now = [R::splat(now[0]), R::splat(now[1]), R::splat(now[2])];
         let horizon = R::splat(horizon);
         // The expected state, in an array that is free until later in the substep.
         for i in 0..self.solution.len() {
-            let target = self.starts[i] + self.segments().weighted(i, now);
-            self.solution[i] = target + self.displacements[i] + self.velocities[i] * horizon;
+            let now = self.targets[i] + self.displacements[i];
+            self.solution[i] = now + self.velocities[i] * horizon;
         }
         self.wind_accelerations.fill(Vec3::zero());
         add_wind(
