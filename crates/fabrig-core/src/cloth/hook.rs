@@ -27,11 +27,13 @@ pub trait SubstepHook {
     /// reset to [mm, head frame].
     fn reset(&mut self, wanted: &mut [Point3<f32>]);
 
-    /// Moves nodes from where the constraints put them. [mm, head frame]
-    fn correct(&mut self, substep: &HookSubstep, nodes: &mut [Point3<f32>]);
+    /// Says where nodes may be that the constraints put at `nodes` [mm, head frame]: see
+    /// [`SubstepHook::moved`].
+    fn correct(&mut self, substep: &HookSubstep, nodes: &[Point3<f32>]);
 
-    /// Nodes that the last call moved, as indices into what it was given.
-    fn moved(&self) -> &[u32];
+    /// Nodes that the last call moved, as indices into what it was given, rising, and where they
+    /// are now. [mm, head frame]
+    fn moved(&self) -> &[(u32, Point3<f32>)];
 
     /// For each of [`SubstepHook::patches`] whether the last call stopped something short in it,
     /// so that its history does not tell how it moves on.

@@ -25,9 +25,13 @@ impl SeenNodes {
     }
 
     /// Calls `work` with layout, node and index of each of the nodes in `moved`.
-    pub(super) fn for_each(&self, moved: &[u32], mut work: impl FnMut(&PatchLayout, usize, usize)) {
-        for &index in moved {
-            let index = index as usize;
+    pub(super) fn for_each(
+        &self,
+        moved: &[(u32, Point3<f32>)],
+        mut work: impl FnMut(&PatchLayout, usize, usize),
+    ) {
+        for (index, _) in moved {
+            let index = *index as usize;
             let patch = self.starts.partition_point(|&s| s <= index) - 1;
             work(&self.patches[patch], index - self.starts[patch], index);
         }
@@ -55,24 +59,30 @@ pub(super) fn advance_hooked(
     let seen = SeenNodes::new(hook.patches(), layout);
     let count = seen.starts[seen.patches.len()];
     let mut nodes = vec![Point3::origin(); count];
-    let mut before = nodes.clone();
     let mut squared = vec![0.0; seen.patches.len()];
+    let mut is_seen = vec![false; groups.len()];
+    seen.patches.iter().for_each(|at| is_seen[at.group] = true);
     groups
         .par_iter_mut()
         .zip(now.par_iter_mut())
-        .for_each(|(g, p)| {
-            g.set_hooked(true);
+        .zip(&is_seen)
+        .for_each(|((g, p), is_seen)| {
+            g.set_hooked(*is_seen);
             g.predict(first, p);
         });
     for (k, substep) in substeps.iter().enumerate() {
         let shared: &[Ports] = now;
-        groups.par_iter_mut().for_each(|g| {
-            g.solve(substep, shared);
-            g.hold_back();
-        });
+        groups
+            .par_iter_mut()
+            .zip(&is_seen)
+            .for_each(|(g, is_seen)| {
+                g.solve(substep, shared);
+                if *is_seen {
+                    g.hold_back();
+                }
+            });
         if !seen.patches.is_empty() {
             seen.gather(groups, &mut nodes);
-            before.copy_from_slice(&nodes);
             let at = &seen.patches[0];
             let [h_e, effective_mass] = groups[at.group].effective_step(at.lane);
             let of_hook = HookSubstep {
@@ -81,12 +91,12 @@ pub(super) fn advance_hooked(
                 h_e,
                 effective_mass,
             };
-            hook.correct(&of_hook, &mut nodes);
+            hook.correct(&of_hook, &nodes);
             squared.fill(0.0);
-            for &index in hook.moved() {
-                let i = index as usize;
+            for (index, to) in hook.moved() {
+                let i = *index as usize;
                 let patch = seen.starts.partition_point(|&s| s <= i) - 1;
-                let (from, to) = (before[i], nodes[i]);
+                let from = nodes[i];
                 let by = [0, 1, 2].map(|axis| f64::from(to[axis]) - f64::from(from[axis]));
                 squared[patch] += by.iter().map(|x| x * x).sum::<f64>();
                 let at = &seen.patches[patch];

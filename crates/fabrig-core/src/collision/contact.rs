@@ -2,11 +2,12 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::detect::PairList;
+use super::detect::{PairList, Watch};
 use super::mesh::Part;
 use super::project::{Active, SmoothContact};
 use super::rules::Rules;
 use super::sticky::{Bond, Lip};
+use super::tile::Tiles;
 use super::world::WorldCollider;
 use super::{
     Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
@@ -81,17 +82,18 @@ pub struct Contact {
     pub(super) positions: Vec<Point3<f32>>,
     pub(super) wanted: Vec<Point3<f32>>,
     pub(super) reference: Vec<Point3<f32>>,
-    /// Furthest from the reference that positions or wanted positions are. (mm)
-    pub(super) travel: Vec<f32>,
     pub(super) part_of: Vec<u32>,
-    /// How far nodes of a part may go before it is looked at anew. (mm)
-    pub(super) budgets: Vec<f32>,
-    /// Largest travel of each part. (mm)
-    pub(super) furthest: Vec<f32>,
-    /// The same of wanted positions alone, in the pass before. (mm)
-    pub(super) last_furthest: Vec<f32>,
-    /// Parts in which something is pushed in this pass.
+    /// Parts that are patches; the others are colliders.
+    pub(super) cloth_parts: usize,
+    /// Largest cover of each part. (mm)
+    pub(super) thickest_cover: Vec<f32>,
+    pub(super) tiles: Tiles,
+    pub(super) watch: Watch,
+    /// Tiles in which something is pushed in this pass, and whether there are any.
     pub(super) is_pushed: Vec<bool>,
+    pub(super) is_any_pushed: bool,
+    /// Nodes that were moved from where they were wanted in this substep.
+    pub(super) altered: Vec<u32>,
     pub(super) lists: Vec<PairList>,
     /// Bodies of the face, then colliders.
     pub(super) world: Vec<WorldCollider>,
@@ -103,7 +105,8 @@ pub struct Contact {
     pub(super) is_touched: Vec<bool>,
     pub(super) carried_by: Vec<u32>,
     pub(super) has_carried: bool,
-    pub(super) moved: Vec<u32>,
+    /// Nodes that the last call moved, and where to.
+    pub(super) moved: Vec<(u32, Point3<f32>)>,
     pub(super) stopped: Vec<bool>,
     pub(super) points: Vec<ContactPoint>,
     pub(super) report: ContactReport,
@@ -182,7 +185,7 @@ impl Contact {
                     Some(index),
                 ));
             }
-            parts.push(Part::of_mesh(vertices, triangles, first));
+            parts.push(Part::of_mesh(vertices.len(), triangles, first));
             rest.extend(vertices.iter().map(|p| p.cast::<f32>()));
             cover.extend(std::iter::repeat_n(0.0, vertices.len()));
         }
@@ -191,6 +194,14 @@ impl Contact {
         for (index, part) in parts.iter().enumerate() {
             part_of[part.first as usize..(part.first + part.count) as usize].fill(index as u32);
         }
+        let tiles = Tiles::new(&parts, &rest);
+        for collider in &mut world {
+            collider.watch_tiles(&tiles, &parts);
+        }
+        let thickest_cover = parts.iter().map(|part: &Part| {
+            let own = &cover[part.first as usize..(part.first + part.count) as usize];
+            own.iter().fold(0.0, |m: f32, &c| m.max(c))
+        });
         let forces = vec![crate::Vector::zeros(); colliders.len()];
         Ok(Self {
             options: *options,
@@ -200,12 +211,14 @@ impl Contact {
             positions: rest.clone(),
             wanted: rest.clone(),
             reference: rest.clone(),
-            travel: vec![f32::INFINITY; count],
             part_of,
-            budgets: vec![-1.0; parts.len()],
-            furthest: vec![0.0; parts.len()],
-            last_furthest: vec![0.0; parts.len()],
-            is_pushed: vec![false; parts.len()],
+            cloth_parts,
+            thickest_cover: thickest_cover.collect(),
+            watch: Watch::new(tiles.len(), parts.len()),
+            is_pushed: vec![false; tiles.len()],
+            is_any_pushed: false,
+            altered: Vec::new(),
+            tiles,
             stopped: vec![false; cloth_parts],
             parts,
             rest,
@@ -231,6 +244,20 @@ impl Contact {
                 ..ContactReport::default()
             },
         })
+    }
+
+    /// Forgets what was known of parts that were put elsewhere.
+    pub(super) fn forget(&mut self, is_moved: impl Fn(Option<usize>) -> bool) {
+        self.watch.is_stale = true;
+        let lists = self.lists.iter_mut();
+        for list in lists.filter(|list| is_moved(list.collider)) {
+            list.pairs.clear();
+        }
+        for (index, collider) in self.world.iter_mut().enumerate() {
+            if is_moved(Some(index)) {
+                collider.free.fill(f64::NEG_INFINITY);
+            }
+        }
     }
 
     /// Whether there is anything that could touch.
@@ -276,7 +303,7 @@ impl Contact {
 
     /// Moves everything from where it is to where it is wanted, in passes short enough that
     /// nothing is overlooked.
-    fn walk(&mut self, goal: &[Point3<f32>], progress: [f64; 2], force_per_shift: f64) {
+    fn walk(&mut self, goal: &[Point3<f32>], progress: [f64; 2], force_per_shift: f64) -> usize {
         let furthest = self.longest_way(goal, progress);
         let passes = ((furthest / PASS_LENGTH).ceil() as usize).clamp(1, MOST_PASSES);
         self.points.clear();
@@ -305,22 +332,22 @@ impl Contact {
             }
             self.pass(force_per_shift, passes);
         }
+        passes
     }
 
     /// The longest way of anything in a substep (mm); marks the colliders that are away.
     fn longest_way(&mut self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
-        let mut squared = 0.0_f32;
-        for (g, x) in goal.iter().zip(&self.positions) {
-            squared = squared.max((g - x).norm_squared());
-        }
-        let mut furthest = f64::from(squared).sqrt();
+        let mut furthest = longest(goal, &self.positions[..self.cloth_count]);
         for index in 0..self.world.len() {
             let c = &self.world[index];
-            let is_away = c.shape.radius.is_finite() && !self.may_meet(c, progress);
+            // The face's own bodies are always there.
+            let may_leave = index >= self.body_count && c.shape.radius.is_finite();
+            let is_away = may_leave && !self.may_meet(c, progress);
             if !is_away {
                 furthest = furthest.max(c.way(progress));
             }
-            self.world[index].is_away = is_away;
+            let was_away = std::mem::replace(&mut self.world[index].is_away, is_away);
+            self.watch.is_stale |= was_away != is_away;
         }
         furthest
     }
@@ -333,15 +360,26 @@ impl Contact {
         force_per_shift: f64,
     ) {
         std::mem::swap(&mut self.was_touched, &mut self.is_touched);
-        self.walk(goal, progress, force_per_shift);
+        self.altered.clear();
+        let passes = self.walk(goal, progress, force_per_shift);
         self.moved.clear();
-        for (i, (x, g)) in self.positions.iter().zip(goal).enumerate() {
-            if x != g {
-                self.moved.push(i as u32);
-            }
+        let moved = |i: u32| {
+            let x = self.positions[i as usize];
+            (x != goal[i as usize]).then_some((i, x))
+        };
+        if passes == 1 {
+            self.altered.sort_unstable();
+            self.altered.dedup();
+            self.moved
+                .extend(self.altered.iter().copied().filter_map(moved));
+        } else {
+            self.moved.extend((0..goal.len() as u32).filter_map(moved));
         }
         self.report.contacts = self.points.len();
-        self.report.candidates = self.lists.iter().map(|l| l.candidates.len()).sum();
+        if progress[1] >= 1.0 {
+            let pairs = self.lists.iter().flat_map(|list| &list.pairs);
+            self.report.candidates = pairs.map(|pair| pair.candidates.len()).sum();
+        }
     }
 }
 
@@ -353,7 +391,7 @@ impl SubstepHook for Contact {
     fn reset(&mut self, wanted: &mut [Point3<f32>]) {
         let count = self.cloth_count;
         self.positions[..count].copy_from_slice(&self.rest[..count]);
-        self.budgets.fill(-1.0);
+        self.forget(|_| true);
         self.bonds.clear();
         let goal = wanted.to_vec();
         // First without the world, from rest, where nothing crosses; then the world comes in
@@ -371,7 +409,7 @@ impl SubstepHook for Contact {
         self.resolve(&goal, [0.0, 1.0], 0.0);
         self.lists.extend(outer);
         self.world.extend(colliders);
-        self.budgets.fill(-1.0);
+        self.watch.is_stale = true;
         let all: Vec<usize> = (self.body_count..self.world.len()).collect();
         self.bring_in_colliders(&all, &goal);
         self.resolve(&goal, [1.0, 1.0], 0.0);
@@ -380,23 +418,36 @@ impl SubstepHook for Contact {
         self.stopped.fill(true);
     }
 
-    fn correct(&mut self, substep: &HookSubstep, nodes: &mut [Point3<f32>]) {
+    fn correct(&mut self, substep: &HookSubstep, nodes: &[Point3<f32>]) {
         // A shift of a node of mass 1 g by 1 mm takes this force. (N)
         let force_per_shift = substep.effective_mass / (substep.h_e * substep.h_e) * 1e-6;
         self.stopped.fill(false);
-        let goal = nodes.to_vec();
-        self.resolve(&goal, substep.progress, force_per_shift);
-        nodes.copy_from_slice(&self.positions[..self.cloth_count]);
+        self.resolve(nodes, substep.progress, force_per_shift);
         if substep.progress[1] >= 1.0 {
             self.drop_broken();
         }
     }
 
-    fn moved(&self) -> &[u32] {
+    fn moved(&self) -> &[(u32, Point3<f32>)] {
         &self.moved
     }
 
     fn stopped(&self) -> &[bool] {
         &self.stopped
     }
+}
+
+/// The longest way from `from` to `to`, or a little more. (mm)
+fn longest(to: &[Point3<f32>], from: &[Point3<f32>]) -> f64 {
+    let [a, b] = [to, from].map(bytemuck::cast_slice::<Point3<f32>, f32>);
+    let largest = a.iter().zip(b).fold(0.0_f32, |m, (a, b)| {
+        let by = (a - b).abs();
+        if by > m { by } else { m }
+    });
+    let most = 3.0_f64.sqrt() * f64::from(largest);
+    if most <= PASS_LENGTH {
+        return most;
+    }
+    let squares = to.iter().zip(from).map(|(a, b)| (a - b).norm_squared());
+    f64::from(squares.fold(0.0, f32::max)).sqrt()
 }

@@ -1,47 +1,31 @@
-//! Candidates: pairs of elements that could meet before they are looked at again.
+//! Which tiles may meet before parts are looked at again.
 //!
-//! Every part has a reference, the positions at which it was last looked at, and a budget: how
-//! far its nodes may go from there. Two elements whose distance at the references exceeds what
-//! both budgets and the thickness take together cannot meet, and are no candidates. When a
-//! node leaves its budget, its part is looked at anew: O(n) refit, and the hierarchies of the
-//! parts that it may collide with are walked.
+//! When parts are looked at, every tile gets a box in which its nodes may go about. Tiles whose
+//! boxes are apart cannot meet; the others are pairs ([`super::certificate`]). When nodes leave
+//! their box, all parts are looked at anew: together, so that certificates know how tiles that
+//! go the same way have gone against each other.
 //!
-//! Source: the per-vertex displacement bounds of Chen et al. 2025, *Offset Geometric Contact*,
-//! kept per part here, so that one list serves many substeps.
+//! Source: the displacement bounds of Chen et al. 2025, *Offset Geometric Contact*, kept per
+//! tile and relative to the other tile here, so that they last over many substeps.
 
-use super::contact::{Contact, PASS_LENGTH};
-use super::distance::{PairKind, closest_weights, weighted, wide};
-use super::judge::Side;
-use super::project::Active;
-use crate::Vector;
+use super::certificate::TilePair;
+use super::contact::Contact;
+use super::tile::{Extent, Way, least, most};
 
 /// How far projection may move nodes before candidates are collected again. (mm)
-pub(super) const MARGIN: f64 = 0.15;
-/// Smallest and largest budget. (mm)
-const BUDGETS: [f32; 2] = [0.3, 2.5];
-
-/// Within this a cell of the default resolution turns by less than 40 degrees. (mm)
-const SMALL_BUDGET: f32 = 0.6;
-
-/// Share of the distance at rest that is kept, where that is less than the thickness.
-const REST_SHARE: f64 = 0.5;
-
+pub(super) const MARGIN: f64 = 0.04;
+/// Room that every tile has around where it is and where it is going. (mm)
+const ROOM: f32 = 0.5;
+/// Passes for which the room of a tile is foreseen, and the furthest that it goes then (mm).
+const FORESEEN: (f32, f32) = (12.0, 3.0);
+/// Certificates found for the second time since parts were looked at, after which they are
+/// looked at anew.
+const MOST_REPEATED: usize = 1500;
 /// What is kept from the mesh inside a round collider, which only stops cells that are
 /// stretched across it: nodes are held out by its round surface. (mm)
-const GUARD_THICKNESS: f64 = 0.05;
+pub(super) const GUARD_THICKNESS: f64 = 0.05;
 
-/// A pair of elements that may collide.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
-    pub(crate) nodes: [u32; 4],
-    pub(crate) kind: PairKind,
-    /// Distance at the references. (mm)
-    pub(crate) distance: f32,
-    /// Distance to keep. (mm)
-    pub(crate) thickness: f32,
-}
-
-/// Candidates between two parts, or within one.
+/// Pairs of tiles of two parts, or of one.
 #[derive(Debug)]
 pub(crate) struct PairList {
     pub(crate) a: usize,
@@ -49,9 +33,8 @@ pub(crate) struct PairList {
     pub(crate) friction: f64,
     /// The collider that `b` is of.
     pub(crate) collider: Option<usize>,
-    pub(crate) candidates: Vec<Candidate>,
-    /// Smallest distance at the references beyond the thickness, of all candidates. (mm)
-    pub(crate) spare: f32,
+    /// Rising.
+    pub(crate) pairs: Vec<TilePair>,
 }
 
 impl PairList {
@@ -61,325 +44,246 @@ impl PairList {
             b,
             friction,
             collider,
-            candidates: Vec::new(),
-            spare: f32::INFINITY,
+            pairs: Vec::new(),
+        }
+    }
+}
+
+/// Where tiles are against where they were last looked at.
+#[derive(Debug, Default)]
+pub(super) struct Watch {
+    /// Ways of each tile's nodes to where they are, and to where they are wanted. (mm)
+    pub(super) now: Vec<Extent>,
+    pub(super) next: Vec<Extent>,
+    /// Both together.
+    pub(super) ways: Vec<Way>,
+    /// Ways that a tile may go before parts are looked at anew. (mm)
+    rooms: Vec<Extent>,
+    /// Boxes that tiles stay in, and parts. (mm)
+    boxes: Vec<Extent>,
+    part_boxes: Vec<Extent>,
+    /// Whether parts are to be looked at, whatever they do.
+    pub(super) is_stale: bool,
+    /// How often parts were looked at, and certificates that were found again since.
+    pub(super) round: u32,
+    pub(super) repeated: usize,
+    /// Counts the moments at which ways were measured.
+    pub(super) stamp: u64,
+    rows: [Vec<f32>; 2],
+}
+
+impl Watch {
+    /// The way of the first tile of a pair against the second: where they are and are wanted.
+    #[inline]
+    pub(super) fn way_of(&self, pair: &TilePair) -> Way {
+        let [a, b] = pair.tiles.map(|t| &self.ways[t as usize]);
+        a.against(b)
+    }
+
+    /// The same, to where they are alone.
+    pub(super) fn way_until_now(&self, pair: &TilePair) -> Way {
+        let [a, b] = pair.tiles.map(|t| Way::of(&self.now[t as usize]));
+        a.against(&b)
+    }
+
+    pub(super) fn new(tile_count: usize, part_count: usize) -> Self {
+        Self {
+            now: vec![Extent::STILL; tile_count],
+            next: vec![Extent::STILL; tile_count],
+            ways: vec![Way::default(); tile_count],
+            rooms: vec![Extent::EMPTY; tile_count],
+            boxes: vec![Extent::EMPTY; tile_count],
+            part_boxes: vec![Extent::EMPTY; part_count],
+            is_stale: true,
+            ..Self::default()
         }
     }
 }
 
 impl Contact {
-    /// Measures how far nodes are from their references, and looks at parts anew where that is
-    /// too far.
-    pub(super) fn refresh_candidates(&mut self) {
-        let mut stale = vec![false; self.parts.len()];
-        let mut any = false;
-        for c in &self.world {
-            if let (true, Some(part)) = (c.is_away, c.part)
-                && self.budgets[part] >= 0.0
-            {
-                self.budgets[part] = -1.0;
-                any = true;
-            }
-        }
-        for (index, part) in self.parts.iter().enumerate() {
+    /// Measures how far tiles are from where they were last looked at, and looks at all parts
+    /// anew where that is too far.
+    pub(super) fn refresh_pairs(&mut self) {
+        self.watch.stamp += 1;
+        let mut is_stale = self.watch.is_stale || self.watch.repeated > MOST_REPEATED;
+        for index in 0..self.parts.len() {
             if self.is_away(index) {
                 continue;
             }
-            let range = part.first as usize..(part.first + part.count) as usize;
-            let mut squared = 0.0_f32;
-            let reference = &self.reference[range.clone()];
-            for (w, r) in self.wanted[range.clone()].iter().zip(reference) {
-                squared = squared.max((w - r).norm_squared());
-            }
-            // Where nothing was pushed, nodes are where they were wanted in the pass before.
-            let mut furthest = squared.sqrt().max(self.last_furthest[index]);
-            if self.is_pushed[index] {
-                let now = self.positions[range].iter().zip(reference);
-                let most = now.fold(0.0_f32, |m, (x, r)| m.max((x - r).norm_squared()));
-                furthest = furthest.max(most.sqrt());
-            }
-            self.last_furthest[index] = squared.sqrt();
-            self.furthest[index] = furthest;
-            if furthest > self.budgets[index] {
-                stale[index] = true;
-                any = true;
+            self.measure(index);
+            let watch = &mut self.watch;
+            for t in self.tiles.of_part[index].clone() {
+                let both = watch.now[t].union(&watch.next[t]);
+                watch.ways[t] = Way::of(&both);
+                is_stale |= !watch.rooms[t].holds(&both);
             }
         }
-        if !any {
+        if is_stale {
+            self.renew();
+        }
+    }
+
+    /// Takes what was altered in this pass into the ways of tiles.
+    pub(super) fn follow(&mut self) {
+        self.watch.stamp += 1;
+        for &node in &self.altered {
+            let n = node as usize;
+            let by = self.wanted[n] - self.reference[n];
+            for &t in self.tiles.of_node(node) {
+                let t = t as usize;
+                let watch = &mut self.watch;
+                watch.next[t].take(&[by.x, by.y, by.z]);
+                let both = watch.now[t].union(&watch.next[t]);
+                watch.ways[t] = Way::of(&both);
+                watch.is_stale |= !watch.rooms[t].holds(&both);
+            }
+        }
+        if self.watch.is_stale {
+            self.renew();
+        }
+    }
+
+    /// At the end of a pass: tiles are where their nodes went.
+    pub(super) fn arrive(&mut self) {
+        let watch = &mut self.watch;
+        std::mem::swap(&mut watch.now, &mut watch.next);
+        if !self.is_any_pushed {
             return;
         }
-        for index in 0..self.parts.len() {
-            if stale[index] {
-                self.renew(index);
-            }
+        for (t, _) in self.is_pushed.iter().enumerate().filter(|(_, p)| **p) {
+            watch.now[t] = self.tiles.tiles[t].ways(&self.reference, &self.positions);
         }
-        let mut lists = std::mem::take(&mut self.lists);
-        let mut cells = Vec::new();
-        for list in &mut lists {
-            if self.is_away(list.b) {
-                list.candidates.clear();
-                list.spare = f32::INFINITY;
-            } else if stale[list.a] || stale[list.b] {
-                self.detect(list, &mut cells);
-            }
-        }
-        self.lists = lists;
+    }
+
+    /// Measures the ways of a part's tiles to where their nodes are wanted.
+    fn measure(&mut self, index: usize) {
+        self.tiles.measure(
+            index,
+            &self.parts[index],
+            [&self.reference, &self.wanted],
+            &mut self.watch.next,
+            &mut self.watch.rows,
+        );
     }
 
     /// Whether a part is that of a collider which cannot meet anything now.
-    fn is_away(&self, part: usize) -> bool {
-        let own = self.world.iter().find(|c| c.part == Some(part));
-        own.is_some_and(|c| c.is_away)
+    pub(super) fn is_away(&self, part: usize) -> bool {
+        part >= self.cloth_parts && self.world.iter().any(|c| c.part == Some(part) && c.is_away)
     }
 
-    fn renew(&mut self, index: usize) {
+    /// Looks at all parts where they are now.
+    fn renew(&mut self) {
         self.report.detections += 1;
-        let part = &mut self.parts[index];
-        let range = part.first as usize..(part.first + part.count) as usize;
-        self.reference[range.clone()].copy_from_slice(&self.positions[range.clone()]);
-        let mut furthest = 0.0_f32;
-        for i in range {
-            let way = (self.wanted[i] - self.positions[i]).norm();
-            furthest = furthest.max(way);
+        for (way, now) in self.watch.ways.iter_mut().zip(&self.watch.now) {
+            *way = Way::of(now);
         }
-        self.furthest[index] = furthest;
-        self.last_furthest[index] = furthest;
-        let [least, most] = BUDGETS;
-        self.budgets[index] = (2.5 * furthest)
-            .clamp(least, most)
-            .max(1.01 * furthest + MARGIN as f32);
-        part.refit(&self.reference);
-    }
-
-    /// How much two elements keep apart at most, over a whole list. (mm)
-    fn thickest(&self, list: &PairList) -> f64 {
-        match list.collider {
-            None => return self.options.thickness,
-            Some(c) if self.world[c].shape.is_round => return GUARD_THICKNESS,
-            Some(_) => {}
+        for list in &mut self.lists {
+            for pair in &mut list.pairs {
+                pair.renew(&self.watch.way_of(pair));
+            }
         }
-        let part = &self.parts[list.a];
-        let covers = &self.cover[part.first as usize..(part.first + part.count) as usize];
-        f64::from(covers.iter().fold(0.0_f32, |m, &c| m.max(c)))
-    }
-
-    fn detect(&self, list: &mut PairList, cells: &mut Vec<[u32; 2]>) {
-        list.candidates.clear();
-        let is_slow = self.budgets[list.a] <= SMALL_BUDGET;
-        if list.a == list.b && is_slow && self.parts[list.a].is_flat() {
-            list.spare = f32::INFINITY;
-            return;
+        for collider in &mut self.world {
+            for (free, (tile, _)) in collider.free.iter_mut().zip(&collider.watched) {
+                *free -= f64::from(self.watch.ways[*tile as usize].longest());
+            }
         }
-        let (a, b) = (&self.parts[list.a], &self.parts[list.b]);
-        let slack = f64::from(self.budgets[list.a] + self.budgets[list.b]) + 2.0 * MARGIN;
-        let reach = self.thickest(list) + slack;
-        let own = list.a == list.b;
-        if own {
-            a.tree.near_own_cells(reach as f32, cells);
-        } else {
-            a.tree.near_cells(&b.tree, reach as f32, cells);
-        }
-        let is_cloth = list.collider.is_none();
-        let is_round = list.collider.is_some_and(|c| self.world[c].shape.is_round);
-        let (out, spare) = (&mut list.candidates, &mut list.spare);
-        *spare = f32::INFINITY;
-        let mut offer = |kind: PairKind, nodes: [u32; 4]| {
-            let at = nodes.map(|n| wide(&self.reference[n as usize]));
-            let thickness = if is_cloth {
-                self.options.thickness
-            } else if is_round {
-                GUARD_THICKNESS
-            } else {
-                self.covered(&nodes)
-            };
-            let limit = thickness + slack;
-            if boxes_apart(kind, &at, limit) {
-                return;
+        self.reference.copy_from_slice(&self.positions);
+        self.watch.is_stale = false;
+        self.watch.repeated = 0;
+        self.watch.round = self.watch.round.wrapping_add(1);
+        for index in 0..self.parts.len() {
+            let is_away = self.is_away(index);
+            if !is_away {
+                self.measure(index);
             }
-            let (first, second) = nodes.split_at(kind.first_count());
-            if own && self.rules.side(a, first, second) != Side::Apart {
-                return;
-            }
-            let distance = weighted(&closest_weights(kind, &at), &at).norm();
-            if distance > limit {
-                return;
-            }
-            let thickness = if is_cloth {
-                self.at_most_rest(kind, &nodes)
-            } else {
-                thickness
-            };
-            *spare = spare.min((distance - thickness) as f32);
-            out.push(Candidate {
-                nodes,
-                kind,
-                distance: distance as f32,
-                thickness: thickness as f32,
-            });
-        };
-        for &[ca, cb] in cells.iter() {
-            if own && a.are_next_cells(ca, cb)
-                || a.are_apart(ca, b, cb, reach as f32, &self.reference)
-            {
-                continue;
-            }
-            let (ca, cb) = (&a.cells[ca as usize], &b.cells[cb as usize]);
-            for &v in &ca.nodes {
-                for &[x, y, z] in &cb.triangles {
-                    offer(PairKind::VertexTriangle, [v, x, y, z]);
+            let mut whole = Extent::EMPTY;
+            for t in self.tiles.of_part[index].clone() {
+                let watch = &mut self.watch;
+                watch.now[t] = Extent::STILL;
+                if is_away {
+                    watch.next[t] = Extent::STILL;
                 }
-            }
-            for &v in &cb.nodes {
-                for &[x, y, z] in &ca.triangles {
-                    offer(PairKind::VertexTriangle, [v, x, y, z]);
+                let next = watch.next[t];
+                watch.ways[t] = Way::of(&watch.now[t].union(&next));
+                let room = room(&next);
+                let mut bounds = self.tiles.tiles[t].bounds(&self.positions);
+                for k in 0..3 {
+                    bounds.low[k] += room.low[k];
+                    bounds.high[k] += room.high[k];
                 }
+                watch.rooms[t] = room;
+                watch.boxes[t] = bounds;
+                whole = whole.union(&bounds);
             }
-            for &[p, q] in &ca.edges {
-                for &[r, s] in &cb.edges {
-                    offer(PairKind::EdgeEdge, [p, q, r, s]);
-                }
-            }
+            self.watch.part_boxes[index] = whole;
         }
-    }
-
-    /// What covers the cloth's nodes of a pair with a collider, at least. (mm)
-    fn covered(&self, nodes: &[u32; 4]) -> f64 {
-        nodes
-            .iter()
-            .filter(|&&n| (n as usize) < self.cloth_count)
-            .map(|&n| f64::from(self.cover[n as usize]))
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// The thickness, or half the distance at rest where that is less. (mm)
-    fn at_most_rest(&self, kind: PairKind, nodes: &[u32; 4]) -> f64 {
-        let at = nodes.map(|n| wide(&self.rest[n as usize]));
-        let rest = weighted(&closest_weights(kind, &at), &at).norm();
-        self.options.thickness.min(REST_SHARE * rest)
-    }
-
-    /// Finds candidates that may come nearer than their thickness on the way to `wanted`.
-    ///
-    /// First without allowance, to see which parts are in contact at all; then, for these, with
-    /// what pushing them apart may add. `everything` takes all parts for that.
-    pub(super) fn collect(&mut self, everything: bool) {
-        self.actives.clear();
-        self.is_pushed.fill(everything);
-        for s in &self.smooth {
-            self.is_pushed[self.part_of[s.node as usize] as usize] = true;
-        }
-        for b in &self.bonds {
-            self.is_pushed[self.part_of[b.nodes[0] as usize] as usize] = true;
-        }
-        let mut has_travel = vec![false; self.parts.len()];
-        let lists = std::mem::take(&mut self.lists);
-        if !everything {
-            for list in &lists {
-                if self.is_pushed[list.a] && self.is_pushed[list.b] || self.is_far(list, 0.0) {
-                    continue;
-                }
-                self.measure_travel(list.a, &mut has_travel);
-                self.measure_travel(list.b, &mut has_travel);
-                if list
-                    .candidates
-                    .iter()
-                    .any(|c| self.may_close(c, 0.0).is_some())
-                {
-                    self.is_pushed[list.a] = true;
-                    self.is_pushed[list.b] = true;
-                }
+        let mut lists = std::mem::take(&mut self.lists);
+        let mut near = Vec::new();
+        for list in &mut lists {
+            near.clear();
+            if !self.is_away(list.b) {
+                self.near_tiles(list, &mut near);
             }
-        }
-        for (index, list) in lists.iter().enumerate() {
-            let is_pushed = self.is_pushed[list.a] || self.is_pushed[list.b];
-            if !is_pushed || self.is_far(list, 2.0 * MARGIN) {
-                continue;
-            }
-            self.measure_travel(list.a, &mut has_travel);
-            self.measure_travel(list.b, &mut has_travel);
-            for c in &list.candidates {
-                let Some((weights, r)) = self.may_close(c, 2.0 * MARGIN) else {
-                    continue;
-                };
-                let distance = r.norm();
-                self.actives.push(Active {
-                    nodes: c.nodes,
-                    kind: c.kind,
-                    weights,
-                    normal: r / distance.max(1e-12),
-                    distance,
-                    thickness: f64::from(c.thickness),
-                    list: index as u32,
-                    push: 0.0,
-                });
-            }
+            merge(&mut list.pairs, &near);
         }
         self.lists = lists;
     }
 
-    /// Whether nothing in a list can come within `more` of its thickness.
-    fn is_far(&self, list: &PairList, more: f64) -> bool {
-        list.spare - self.furthest[list.a] - self.furthest[list.b] > more as f32
-    }
-
-    /// Measures how far each node of a part is from its reference, now and as wanted.
-    fn measure_travel(&mut self, index: usize, has_travel: &mut [bool]) {
-        if std::mem::replace(&mut has_travel[index], true) {
+    /// Tiles of a list whose boxes may touch, rising.
+    fn near_tiles(&self, list: &PairList, near: &mut Vec<[u32; 2]>) {
+        let reach = (self.thickest(list) + 2.0 * MARGIN) as f32;
+        let watch = &self.watch;
+        let [whole_a, whole_b] = [list.a, list.b].map(|p| &watch.part_boxes[p]);
+        if !whole_a.is_near(whole_b, reach) {
             return;
         }
-        let part = &self.parts[index];
-        for i in part.first as usize..(part.first + part.count) as usize {
-            let r = &self.reference[i];
-            let squared = (self.wanted[i] - r)
-                .norm_squared()
-                .max((self.positions[i] - r).norm_squared());
-            self.travel[i] = squared.sqrt();
+        for a in self.tiles.of_part[list.a].clone() {
+            let own = &watch.boxes[a];
+            if !own.is_near(whole_b, reach) {
+                continue;
+            }
+            let others = self.tiles.of_part[list.b].clone();
+            for b in others.start.max(if list.a == list.b { a } else { 0 })..others.end {
+                if own.is_near(&watch.boxes[b], reach) {
+                    near.push([a as u32, b as u32]);
+                }
+            }
         }
     }
 
-    /// Weights and vector between the closest points of a candidate, if it may come within
-    /// `more` of its thickness on the way.
-    #[inline]
-    fn may_close(&self, c: &Candidate, more: f64) -> Option<([f64; 4], Vector)> {
-        let [t0, t1, t2, t3] = c.nodes.map(|n| self.travel[n as usize]);
-        let travel = match c.kind {
-            PairKind::VertexTriangle => t0 + t1.max(t2).max(t3),
-            PairKind::EdgeEdge => t0.max(t1) + t2.max(t3),
-        };
-        let limit = c.thickness + more as f32;
-        if c.distance - travel > limit {
-            return None;
+    /// How much two elements of a list keep apart at most. (mm)
+    pub(super) fn thickest(&self, list: &PairList) -> f64 {
+        match list.collider {
+            None => self.options.thickness,
+            Some(c) if self.world[c].shape.is_round => GUARD_THICKNESS,
+            Some(_) => f64::from(self.thickest_cover[list.a]),
         }
-        let at = c.nodes.map(|n| wide(&self.positions[n as usize]));
-        let to = c.nodes.map(|n| wide(&self.wanted[n as usize]));
-        let weights = closest_weights(c.kind, &at);
-        let r = weighted(&weights, &at);
-        (r.norm() - approach(c.kind, &at, &to) <= f64::from(limit)).then_some((weights, r))
     }
 }
 
-/// How much nearer two elements can come when their nodes go straight from `at` to `to`: what
-/// they move in common does not count. (mm)
-pub(super) fn approach(kind: PairKind, at: &[Vector; 4], to: &[Vector; 4]) -> f64 {
-    let moves: [Vector; 4] = std::array::from_fn(|i| to[i] - at[i]);
-    let mean = (moves[0] + moves[1] + moves[2] + moves[3]) * 0.25;
-    let squared = moves.map(|m| (m - mean).norm_squared());
-    let first = kind.first_count();
-    let largest = |s: &[f64]| s.iter().fold(0.0, |m: f64, &x| m.max(x)).sqrt();
-    largest(&squared[..first]) + largest(&squared[first..])
+/// Ways that a tile may go which now goes `next`.
+fn room(next: &Extent) -> Extent {
+    let (passes, furthest) = FORESEEN;
+    Extent {
+        low: next
+            .low
+            .map(|x| least(least(x, 0.0), most(passes * x, -furthest)) - ROOM),
+        high: next
+            .high
+            .map(|x| most(most(x, 0.0), least(passes * x, furthest)) + ROOM),
+    }
 }
 
-fn boxes_apart(kind: PairKind, at: &[Vector; 4], limit: f64) -> bool {
-    let (first, second) = at.split_at(kind.first_count());
-    (0..3).any(|k| {
-        let range = |s: &[Vector]| {
-            s.iter()
-                .fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])))
-        };
-        let ((la, ha), (lb, hb)) = (range(first), range(second));
-        la - hb > limit || lb - ha > limit
-    })
+/// Makes `pairs` those of `near`; both rise. What was known of pairs that stay is kept.
+fn merge(pairs: &mut Vec<TilePair>, near: &[[u32; 2]]) {
+    if pairs.len() == near.len() && pairs.iter().zip(near).all(|(p, n)| p.tiles == *n) {
+        return;
+    }
+    let mut old = std::mem::take(pairs).into_iter().peekable();
+    pairs.reserve(near.len());
+    for tiles in near {
+        while old.next_if(|p| p.tiles < *tiles).is_some() {}
+        let kept = old.next_if(|p| p.tiles == *tiles);
+        pairs.push(kept.unwrap_or_else(|| TilePair::new(*tiles)));
+    }
 }
-
-// A part is renewed with a budget above the longest pass, so that it stays within it.
-const _: () = assert!(PASS_LENGTH < BUDGETS[1] as f64);

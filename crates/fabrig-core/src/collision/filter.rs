@@ -9,8 +9,9 @@
 //!
 //! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
 
+use super::collect::approach;
 use super::contact::Contact;
-use super::detect::{MARGIN, approach};
+use super::detect::MARGIN;
 use super::distance::{PairKind, closest_weights, weighted, wide};
 use super::project::{Active, narrow};
 use crate::Vector;
@@ -32,12 +33,20 @@ impl Contact {
         if std::mem::take(&mut self.has_carried) {
             self.carried_by.fill(u32::MAX);
         }
-        self.refresh_candidates();
+        if std::mem::take(&mut self.is_any_pushed) {
+            self.is_pushed.fill(false);
+        }
+        self.refresh_pairs();
         self.collect_smooth();
-        self.collect(false);
+        let bonds = std::mem::take(&mut self.bonds);
+        for &node in bonds.iter().flat_map(|bond| &bond.nodes) {
+            self.push_node(node);
+        }
+        self.bonds = bonds;
+        self.collect();
         if !self.actives.is_empty() || !self.smooth.is_empty() || !self.bonds.is_empty() {
-            let pushes = self.project_within(force_per_shift);
-            self.make_safe(pushes);
+            let went_far = self.project_within(force_per_shift);
+            self.make_safe(went_far);
             self.note_contacts(force_per_shift / passes as f64);
         }
         std::mem::swap(&mut self.positions, &mut self.wanted);
@@ -45,25 +54,31 @@ impl Contact {
         let count = self.cloth_count;
         let (positions, wanted) = (&self.positions, &mut self.wanted);
         wanted[count..].copy_from_slice(&positions[count..]);
+        self.arrive();
     }
 
     /// Projects, and returns whether nodes went further than collecting allowed for.
     fn project_within(&mut self, force_per_shift: f64) -> bool {
-        let touched: Vec<(u32, Vector)> = self
-            .actives
-            .iter()
-            .flat_map(|a| a.nodes)
-            .chain(self.smooth.iter().map(|s| s.node))
-            .chain(self.bonds.iter().flat_map(|b| b.nodes))
-            .filter(|&n| (n as usize) < self.cloth_count)
-            .map(|n| (n, wide(&self.wanted[n as usize])))
-            .collect();
+        let mut touched: Vec<(u32, Vector)> = Vec::with_capacity(4 * self.actives.len());
+        touched.extend(
+            (self.actives.iter())
+                .flat_map(|a| a.nodes)
+                .chain(self.smooth.iter().map(|s| s.node))
+                .chain(self.bonds.iter().flat_map(|b| b.nodes))
+                .filter(|&n| (n as usize) < self.cloth_count)
+                .map(|n| (n, wide(&self.wanted[n as usize]))),
+        );
         self.project(force_per_shift);
-        touched.iter().any(|(n, before)| {
-            let i = *n as usize;
-            let way = (wide(&self.wanted[i]) - before).norm();
-            way > MARGIN || (way > 0.0 && !self.is_pushed[self.part_of[i] as usize])
-        })
+        let mut went_far = false;
+        for (node, before) in touched {
+            let way = (wide(&self.wanted[node as usize]) - before).norm();
+            if way > 0.0 {
+                self.altered.push(node);
+                let is_new = self.push_node(node);
+                went_far |= is_new || way > MARGIN;
+            }
+        }
+        went_far
     }
 
     fn make_safe(&mut self, mut went_far: bool) {
@@ -77,8 +92,8 @@ impl Contact {
                     .filter(|a| a.push > 0.0)
                     .copied()
                     .collect();
-                self.refresh_candidates();
-                self.collect(true);
+                self.follow();
+                self.collect_pushed();
                 self.remember(&pushes);
                 went_far = false;
             }
@@ -107,6 +122,8 @@ impl Contact {
                     if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
                         continue;
                     }
+                    self.altered.push(n);
+                    self.push_node(n);
                     let from = wide(&self.positions[i]);
                     let way = wide(&self.wanted[i]) - from;
                     self.wanted[i] = if halved < HALVINGS {
@@ -173,6 +190,8 @@ impl Contact {
         self.wanted[node] = narrow(&(c.pose * local).coords);
         self.carried_by[node] = collider as u32;
         self.has_carried = true;
+        self.altered.push(node as u32);
+        self.push_node(node as u32);
         self.report.carried += 1;
     }
 

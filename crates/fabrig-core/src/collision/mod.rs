@@ -5,13 +5,14 @@
 //! that nothing passes through anything on the way:
 //!
 //! ```text
-//! broad phase -> candidates -> contacts that may close -> push apart, friction, bonds
+//! pairs of tiles -> candidates -> contacts that may close -> push apart, friction, bonds
 //!             -> hold back what would still cross -> new positions
 //! ```
 //!
 //! - `rules`: which elements may collide at all
-//! - `tree`, `detect`: the hierarchy of boxes that a grid implies, and candidates that stay
-//!   valid while nodes keep within their budgets
+//! - `tile`, `detect`: pieces of parts, how far they have gone, and which of them may meet
+//! - `certificate`: what proves from substep to substep that two tiles do not meet
+//! - `collect`: where nothing proves it, the elements that may
 //! - `distance`: vertices and triangles, edges and edges
 //! - `project`: contacts as planes, Coulomb friction; `sticky`: bonds between lips
 //! - `filter`: conservative advancement, the guarantee that nothing crosses
@@ -27,7 +28,9 @@
 //! Millimetres in the head frame. Forces are in newtons of a face whose patches weigh what
 //! [`crate::cloth::ClothOptions::areal_density`] says.
 
+mod certificate;
 mod cloth_shape;
+mod collect;
 mod collider;
 mod contact;
 mod crossing;
@@ -44,6 +47,7 @@ mod rules;
 mod sheet;
 mod star;
 mod sticky;
+mod tile;
 mod tree;
 mod world;
 

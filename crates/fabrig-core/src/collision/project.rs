@@ -24,6 +24,9 @@ const ENOUGH: f64 = 2e-3;
 /// How fast contacts that are too near are let out, per pass. (mm)
 const RELEASE: f64 = 0.05;
 
+/// Distances to smooth bodies are exact to first order: so much of them is believed.
+const ROOM_SHARE: f64 = 0.8;
+
 /// A pair that may meet in this pass.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Active {
@@ -68,55 +71,84 @@ impl Contact {
 
     /// Finds the nodes that round colliders touch on the way to `wanted`.
     pub(super) fn collect_smooth(&mut self) {
-        self.smooth.clear();
-        for (index, c) in self.world.iter().enumerate() {
+        let mut smooth = std::mem::take(&mut self.smooth);
+        smooth.clear();
+        for index in 0..self.world.len() {
+            let c = &mut self.world[index];
             if !c.shape.is_round || c.is_away {
                 continue;
             }
-            let inverse = c.pose.inverse();
-            let center = c.pose.translation.vector;
-            let mut offset = 0;
-            for &held in &c.held {
-                let part = &self.parts[held];
-                let range = part.first as usize..(part.first + part.count) as usize;
-                for i in range {
-                    let gap = if c.gaps.is_empty() {
-                        f64::from(self.cover[i])
-                    } else {
-                        f64::from(c.gaps[offset])
-                    };
-                    offset += 1;
-                    let x = wide(&self.wanted[i]);
-                    let reach = c.shape.radius + gap.max(0.0) + MARGIN;
-                    if (x - center).norm_squared() > reach * reach {
-                        continue;
-                    }
-                    let place = c.shape.nearest(&(inverse * crate::Point::from(x)).coords);
-                    if place.distance > gap + MARGIN {
-                        continue;
-                    }
-                    let Some(local) = place.normal else {
-                        continue;
-                    };
-                    let normal = c.pose.rotation * local;
-                    // A node that is deeper than its way in this pass allows started there: it
-                    // is let out slowly.
-                    let before =
-                        c.pose_before.inverse() * crate::Point::from(wide(&self.positions[i]));
-                    let was = c.shape.nearest(&before.coords).distance;
-                    let keep = gap.min(was.max(place.distance) + RELEASE);
-                    let target = (c.pose * before).coords;
-                    self.smooth.push(SmoothContact {
-                        node: i as u32,
-                        collider: index as u32,
-                        normal,
-                        offset: normal.dot(&x) - place.distance + keep,
-                        carried: target - wide(&self.positions[i]),
-                        push: 0.0,
-                    });
+            let mut free = std::mem::take(&mut c.free);
+            let c = &self.world[index];
+            for (free, &(tile, first_gap)) in free.iter_mut().zip(&c.watched) {
+                let gone = c.gone + f64::from(self.watch.ways[tile as usize].longest());
+                if gone >= *free {
+                    let room = self.touch_tile(index, tile, first_gap, &mut smooth);
+                    // What it may go from here, less what it may have gone to here.
+                    *free = ROOM_SHARE * room + 2.0 * c.gone - gone;
                 }
             }
+            self.world[index].free = free;
         }
+        for s in &smooth {
+            self.push_node(s.node);
+        }
+        self.smooth = smooth;
+    }
+
+    /// Finds the nodes of a tile that a round collider touches. Returns how far the others are
+    /// at least from being found. (mm)
+    fn touch_tile(
+        &self,
+        index: usize,
+        tile: u32,
+        first_gap: i64,
+        out: &mut Vec<SmoothContact>,
+    ) -> f64 {
+        let c = &self.world[index];
+        let inverse = c.pose.inverse();
+        let center = c.pose.translation.vector;
+        let mut room = f64::INFINITY;
+        for &node in &self.tiles.tiles[tile as usize].own {
+            let i = node as usize;
+            let gap = if c.gaps.is_empty() {
+                f64::from(self.cover[i])
+            } else {
+                f64::from(c.gaps[(first_gap + i64::from(node)) as usize])
+            };
+            let x = wide(&self.wanted[i]);
+            let reach = c.shape.radius + gap.max(0.0) + MARGIN;
+            let squared = (x - center).norm_squared();
+            if squared > reach * reach {
+                room = room.min(squared.sqrt() - reach);
+                continue;
+            }
+            let place = c.shape.nearest(&(inverse * crate::Point::from(x)).coords);
+            if place.distance > gap + MARGIN {
+                room = room.min(place.distance - gap - MARGIN);
+                continue;
+            }
+            room = 0.0;
+            let Some(local) = place.normal else {
+                continue;
+            };
+            let normal = c.pose.rotation * local;
+            // A node that is deeper than its way in this pass allows started there: it is let
+            // out slowly.
+            let before = c.pose_before.inverse() * crate::Point::from(wide(&self.positions[i]));
+            let was = c.shape.nearest(&before.coords).distance;
+            let keep = gap.min(was.max(place.distance) + RELEASE);
+            let target = (c.pose * before).coords;
+            out.push(SmoothContact {
+                node,
+                collider: index as u32,
+                normal,
+                offset: normal.dot(&x) - place.distance + keep,
+                carried: target - wide(&self.positions[i]),
+                push: 0.0,
+            });
+        }
+        room
     }
 
     /// Moves `wanted` until contacts are apart, then takes friction off.

@@ -86,7 +86,10 @@ impl Scene {
                 h_e: f64::from(h),
                 effective_mass: 1.2,
             };
-            self.contact.correct(&substep, &mut self.positions);
+            self.contact.correct(&substep, &self.positions);
+            for &(i, to) in self.contact.moved() {
+                self.positions[i as usize] = to;
+            }
             for (v, (x, o)) in self
                 .velocities
                 .iter_mut()

@@ -1,7 +1,5 @@
-//! The broad phase: a hierarchy of boxes over the cells of a part, refitted in O(n).
-//!
-//! For a grid the hierarchy is the quadtree that the grid implies, so it is never rebuilt; for
-//! the mesh of a collider it is made once by halving the longest extent.
+//! A hierarchy of boxes over cells, made once by halving the longest extent and refitted in
+//! O(n).
 
 use nalgebra::Point3;
 
@@ -25,15 +23,6 @@ pub(crate) struct Tree {
 const LEAF: u32 = u32::MAX;
 
 impl Tree {
-    /// The quadtree of `columns` x `rows` cells, cell (u, v) at `v * columns + u`.
-    pub(crate) fn of_grid(columns: usize, rows: usize) -> Self {
-        let mut tree = Self::default();
-        if columns * rows > 0 {
-            tree.split_grid([0, columns], [0, rows], columns);
-        }
-        tree
-    }
-
     /// A hierarchy over cells with these centres.
     pub(crate) fn of_centers(centers: &[Vector]) -> Self {
         let mut tree = Self::default();
@@ -51,29 +40,6 @@ impl Tree {
             children,
         });
         self.nodes.len() - 1
-    }
-
-    fn split_grid(&mut self, u: [usize; 2], v: [usize; 2], columns: usize) -> u32 {
-        let (width, height) = (u[1] - u[0], v[1] - v[0]);
-        if width == 1 && height == 1 {
-            return self.push([(v[0] * columns + u[0]) as u32, LEAF]) as u32;
-        }
-        let index = self.push([0, 0]);
-        let (a, b) = if width >= height {
-            let middle = u[0] + width / 2;
-            (
-                self.split_grid([u[0], middle], v, columns),
-                self.split_grid([middle, u[1]], v, columns),
-            )
-        } else {
-            let middle = v[0] + height / 2;
-            (
-                self.split_grid(u, [v[0], middle], columns),
-                self.split_grid(u, [middle, v[1]], columns),
-            )
-        };
-        self.nodes[index].children = [a, b];
-        index as u32
     }
 
     fn split_centers(&mut self, cells: &mut [u32], centers: &[Vector]) -> u32 {
@@ -127,47 +93,28 @@ impl Tree {
         }
     }
 
-    /// Pairs of cells of two trees whose boxes are within `reach` of each other.
-    pub(crate) fn near_cells(&self, other: &Self, reach: f32, out: &mut Vec<[u32; 2]>) {
-        out.clear();
-        if !self.nodes.is_empty() && !other.nodes.is_empty() {
-            self.descend(other, [0, 0], reach, out);
-        }
-    }
-
-    /// Pairs of cells of this tree whose boxes are within `reach`, each once.
-    pub(crate) fn near_own_cells(&self, reach: f32, out: &mut Vec<[u32; 2]>) {
-        out.clear();
-        for node in &self.nodes {
-            if let [l, r] = node.children
-                && r != LEAF
-            {
-                self.descend(self, [l, r], reach, out);
-            }
-        }
-    }
-
-    /// Pairs of cells under two nodes, one of each tree, whose boxes are within `reach`.
-    fn descend(&self, other: &Self, start: [u32; 2], reach: f32, out: &mut Vec<[u32; 2]>) {
-        let mut stack = vec![start];
-        while let Some([a, b]) = stack.pop() {
-            let (na, nb) = (&self.nodes[a as usize], &other.nodes[b as usize]);
-            if !are_near(na, nb, reach) {
+    /// Cells under the highest nodes that have no more than `most` of them.
+    pub(crate) fn clusters(&self, most: usize) -> Vec<Vec<u32>> {
+        let mut cells: Vec<Vec<u32>> = vec![Vec::new(); self.nodes.len()];
+        let mut is_whole = vec![false; self.nodes.len()];
+        // Children stand after their parents.
+        for index in (0..self.nodes.len()).rev() {
+            let [a, b] = self.nodes[index].children;
+            if b == LEAF {
+                cells[index] = vec![a];
+                is_whole[index] = true;
                 continue;
             }
-            match (na.children[1] == LEAF, nb.children[1] == LEAF) {
-                (true, true) => out.push([na.children[0], nb.children[0]]),
-                (true, false) => nb.children.iter().for_each(|&c| stack.push([a, c])),
-                (false, true) => na.children.iter().for_each(|&c| stack.push([c, b])),
-                (false, false) => {
-                    if size(na) >= size(nb) {
-                        na.children.iter().for_each(|&c| stack.push([c, b]));
-                    } else {
-                        nb.children.iter().for_each(|&c| stack.push([a, c]));
-                    }
-                }
+            let [a, b] = [a as usize, b as usize];
+            if is_whole[a] && is_whole[b] && cells[a].len() + cells[b].len() <= most {
+                let mut own = std::mem::take(&mut cells[a]);
+                own.append(&mut cells[b]);
+                cells[index] = own;
+                is_whole[index] = true;
             }
         }
+        cells.retain(|c| !c.is_empty());
+        cells
     }
 
     /// The cell nearest to a point within `reach`: `measure` gives the distance of a cell, or
@@ -215,14 +162,4 @@ fn outside(n: &Node, p: &Point3<f32>) -> f32 {
         .map(|k| (n.low[k] - p[k]).max(p[k] - n.high[k]).max(0.0).powi(2))
         .sum();
     squared.sqrt()
-}
-
-#[inline]
-fn are_near(a: &Node, b: &Node, reach: f32) -> bool {
-    (0..3).all(|k| a.low[k] - b.high[k] <= reach && b.low[k] - a.high[k] <= reach)
-}
-
-#[inline]
-fn size(n: &Node) -> f32 {
-    (0..3).map(|k| n.high[k] - n.low[k]).fold(0.0, f32::max)
 }

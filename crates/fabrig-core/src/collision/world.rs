@@ -6,6 +6,7 @@ use super::cloth_shape::WorldShape;
 use super::collider::between;
 use super::contact::{Contact, ContactBody, PASS_LENGTH};
 use super::mesh::Part;
+use super::tile::Tiles;
 use super::{Collider, CollisionError};
 use crate::{Point, Vector};
 
@@ -23,6 +24,13 @@ pub(super) struct WorldCollider {
     /// For each node of the held parts, one after the other, the distance it must keep (mm);
     /// empty: what covers the node.
     pub(super) gaps: Vec<f32>,
+    /// For each tile of the held parts how far it and this may go before it can touch, against
+    /// [`Self::gone`]. (mm)
+    pub(super) free: Vec<f64>,
+    /// The tiles, and the first gap of each one's part less the part's first node.
+    pub(super) watched: Vec<(u32, i64)>,
+    /// How far any of its points has gone since the start, at most. (mm)
+    pub(super) gone: f64,
     /// Pose that the cloth has seen, and before the pass. [mm, head frame]
     pub(super) pose: Isometry3<f64>,
     pub(super) pose_before: Isometry3<f64>,
@@ -56,6 +64,9 @@ impl WorldCollider {
             part: None,
             is_away: false,
             gaps: Vec::new(),
+            free: Vec::new(),
+            watched: Vec::new(),
+            gone: 0.0,
             pose,
             pose_before: pose,
             start: pose,
@@ -74,6 +85,22 @@ impl WorldCollider {
                 self.gaps.push((distance - 0.02).min(thickness) as f32);
             }
         }
+    }
+
+    /// Takes the tiles of the parts that it holds out, if it does so node by node.
+    pub(super) fn watch_tiles(&mut self, tiles: &Tiles, parts: &[Part]) {
+        if !self.shape.is_round {
+            return;
+        }
+        let mut gaps = 0;
+        for &held in &self.held {
+            let part = &parts[held];
+            let first = gaps - i64::from(part.first);
+            let own = tiles.of_part[held].clone();
+            self.watched.extend(own.map(|t| (t as u32, first)));
+            gaps += i64::from(part.count);
+        }
+        self.free = vec![f64::NEG_INFINITY; self.watched.len()];
     }
 
     fn at(&self, s: f64) -> Isometry3<f64> {
@@ -129,6 +156,7 @@ impl Contact {
     /// Puts colliders where they are at a time of the frame, as wanted.
     pub(super) fn place_colliders(&mut self, s: f64) {
         for c in &mut self.world {
+            c.gone += c.way([s, s]);
             c.pose_before = c.pose;
             c.pose = c.at(s);
             let Some(part) = c.part else {
@@ -173,9 +201,9 @@ impl Contact {
                     self.positions[first + k] = (outside * p).cast();
                     self.wanted[first + k] = self.positions[first + k];
                 }
-                self.budgets[part] = -1.0;
             }
         }
+        self.forget(|collider| collider.is_some_and(|c| which.contains(&c)));
         for &index in which {
             self.world[index].end = ways[index][1];
             let way = self.world[index].way([0.0, 1.0]);

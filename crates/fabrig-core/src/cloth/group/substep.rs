@@ -256,8 +256,12 @@ impl<R: Real> Group<R> {
         for i in 0..self.solution.len() {
             let old = self.displacements[i];
             let step = self.solution[i] - self.targets[i] - old;
+            let relative = step.dot(step);
+            if !R::any_less(limit, relative) {
+                continue;
+            }
             let moved = step + self.segments().weighted(i, weights);
-            let (relative, absolute) = (step.dot(step), moved.dot(moved));
+            let absolute = moved.dot(moved);
             let squared = R::select_less(relative, absolute, relative, absolute);
             if !R::any_less(limit, squared) {
                 continue;

@@ -1,0 +1,217 @@
+//! Pairs of tiles, and what proves that they do not meet.
+//!
+//! A pair keeps two certificates; each is found by looking at all nodes once, and is then tested
+//! in a few operations by how far the two tiles have gone against each other since:
+//!
+//! - a *slab*: along a direction n the first tile stays in front of the second with a gap to
+//!   spare. Tiles that slide along each other do not use it up;
+//! - a *length*: they may go this far against each other in any direction. For two tiles beside
+//!   each other in one grid it says that they are flat, for others that no two of their
+//!   elements are nearer.
+//!
+//! Where neither holds, the pair has a list of its elements that are near each other, from which
+//! the second certificate comes, and those that may close are contacts to be.
+
+use nalgebra::{Point3, Vector3};
+
+use super::distance::PairKind;
+use super::tile::{Tile, Way, least, most};
+
+/// Least cosine between the normals of flat tiles and their mean: 50 degrees, so that what
+/// [`FLAT_WAY`] allows leaves them under 90.
+const FLAT: f32 = 0.64;
+/// Within this a cell of the default resolution turns by less than 40 degrees. (mm)
+pub(super) const FLAT_WAY: f32 = 0.6;
+/// What stored positions and their differences may be off by. (mm)
+const ROUNDING: f32 = 1e-4;
+
+/// A pair of elements that may collide.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    pub(crate) nodes: [u32; 4],
+    pub(crate) kind: PairKind,
+    /// Distance when the list was made, beyond the thickness. (mm)
+    pub(crate) gap: f32,
+    /// Distance to keep. (mm)
+    pub(crate) thickness: f32,
+}
+
+/// Two tiles that may meet, of two parts or of one.
+#[derive(Debug, Clone)]
+pub(crate) struct TilePair {
+    pub(crate) tiles: [u32; 2],
+    /// Direction of the slab, from the second tile to the first.
+    normal: [f32; 3],
+    /// Gap along it at the references beyond the thickness; negative infinity: none known. (mm)
+    gap: f32,
+    /// How far the tiles may go against each other from the references. (mm)
+    length: f32,
+    /// How far they had gone against each other, at most, from where the list was made to the
+    /// references. (mm)
+    spent: f32,
+    /// Up to which gap the list holds all candidates; negative: there is no list. (mm)
+    pub(crate) reach: f32,
+    pub(crate) candidates: Vec<Candidate>,
+    /// The moment at which the list was made, and how far the tiles went against each other in
+    /// that pass. (mm)
+    stamp: u64,
+    pass: f32,
+    /// When parts were looked at last before a certificate was found.
+    pub(crate) round: u32,
+}
+
+impl TilePair {
+    pub(crate) fn new(tiles: [u32; 2]) -> Self {
+        Self {
+            tiles,
+            normal: [0.0; 3],
+            gap: f32::NEG_INFINITY,
+            length: f32::NEG_INFINITY,
+            spent: 0.0,
+            reach: -1.0,
+            candidates: Vec::new(),
+            stamp: 0,
+            pass: 0.0,
+            round: 0,
+        }
+    }
+
+    /// Whether a certificate shows that the tiles stay `more` beyond the thickness apart.
+    ///
+    /// - `way`: of the first tile against the second, from the references
+    #[inline]
+    pub(crate) fn is_clear(&self, way: &Way, more: f32) -> bool {
+        if self.gap + way.along(&self.normal)[0] > more + ROUNDING {
+            return true;
+        }
+        let spare = self.length - more - ROUNDING;
+        spare > 0.0 && way.longest_squared() < spare * spare
+    }
+
+    /// Takes what the tiles have gone off the certificates, so that they hold from references
+    /// that are where the tiles are now.
+    pub(crate) fn renew(&mut self, way: &Way) {
+        if self.gap > f32::NEG_INFINITY {
+            self.gap += way.along(&self.normal)[0] - ROUNDING;
+        }
+        let length = way.longest() + ROUNDING;
+        self.length -= length;
+        self.spent += length;
+    }
+
+    /// Keeps a slab that was found where the tiles are now.
+    ///
+    /// - `gap`: along `normal`, beyond the thickness (mm)
+    /// - `way`: to where they are
+    pub(crate) fn keep_slab(&mut self, normal: Vector3<f32>, gap: f32, way: &Way) {
+        self.normal = normal.into();
+        self.gap = gap - way.along(&self.normal)[1] - ROUNDING;
+        self.reach = -1.0;
+        self.candidates.clear();
+    }
+
+    /// Keeps a length found where the tiles are now. (mm)
+    pub(crate) fn keep_length(&mut self, length: f32, way: &Way) {
+        self.length = length - way.longest() - ROUNDING;
+    }
+
+    /// Says that the list was made where the tiles are now.
+    ///
+    /// - `stamp`, `pass`: of this moment, and how far the tiles go against each other from now
+    ///   to where they are wanted (mm)
+    pub(crate) fn keep_list(&mut self, reach: f32, way: &Way, (stamp, pass): (u64, f32)) {
+        self.reach = reach;
+        self.spent = way.longest() + ROUNDING;
+        (self.stamp, self.pass) = (stamp, pass + ROUNDING);
+        let nearest = self.candidates.iter().map(|c| c.gap).fold(reach, least);
+        self.length = nearest - self.spent;
+    }
+
+    /// What a distance that is known where the tiles are now is more than one that was known when
+    /// the list was made, for [`Candidate::gap`]. (mm)
+    ///
+    /// - `way`: to where they are
+    #[inline]
+    pub(crate) fn known(&self, way: &Way) -> f32 {
+        self.spent - way.longest() - ROUNDING
+    }
+
+    /// How far elements may have gone against each other since the list was made. (mm)
+    #[inline]
+    pub(crate) fn since_list(&self, way: &Way, stamp: u64) -> f32 {
+        if self.stamp == stamp {
+            return self.pass;
+        }
+        self.spent + way.longest() + ROUNDING
+    }
+}
+
+/// The widest slab between two tiles of those that their normals and middles suggest: direction
+/// from the second to the first, and gap (mm).
+///
+/// - `states`: positions between which nodes go
+/// - `normals`: of the tiles, of any length
+/// - `enough`: a gap that needs no better one (mm)
+pub(crate) fn slab(
+    [a, b]: [&Tile; 2],
+    states: [&[Point3<f32>]; 2],
+    normals: [Vector3<f32>; 2],
+    enough: f32,
+) -> (Vector3<f32>, f32) {
+    let mut best = (Vector3::zeros(), f32::NEG_INFINITY);
+    let between = || {
+        let middle = |tile: &Tile| -> Vector3<f32> {
+            let nodes = tile.hull.iter();
+            let sum: Vector3<f32> = nodes.map(|&n| states[0][n as usize].coords).sum();
+            sum / tile.hull.len() as f32
+        };
+        middle(a) - middle(b)
+    };
+    for k in 0..4 {
+        let direction = match k {
+            0 => normals[0],
+            1 => normals[1],
+            2 => between(),
+            _ => {
+                // Across the mean normal: tiles side by side in one layer.
+                let n = normals[0] + normals[1];
+                let d = between();
+                d - n * (d.dot(&n) / n.norm_squared().max(f32::MIN_POSITIVE))
+            }
+        };
+        let Some(n) = direction.try_normalize(1e-12) else {
+            continue;
+        };
+        let range = |tile: &Tile| {
+            let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
+            for &node in &tile.hull {
+                for state in states {
+                    let height = n.dot(&state[node as usize].coords);
+                    ends = [least(ends[0], height), most(ends[1], height)];
+                }
+            }
+            ends
+        };
+        let (of_a, of_b) = (range(a), range(b));
+        for (n, gap) in [(n, of_a[0] - of_b[1]), (-n, of_b[0] - of_a[1])] {
+            if gap > best.1 {
+                best = (n, gap);
+            }
+        }
+        if best.1 > enough {
+            break;
+        }
+    }
+    best
+}
+
+/// Whether all of these normals, of any length, are so much alike that a sheet which has them
+/// cannot reach itself.
+pub(crate) fn are_flat(normals: &[Vector3<f32>]) -> bool {
+    let sum: Vector3<f32> = normals.iter().sum();
+    let least = FLAT * FLAT * sum.norm_squared();
+    normals.iter().all(|n| {
+        let along = n.dot(&sum);
+        along > 0.0 && along * along > least * n.norm_squared()
+    })
+}
