@@ -1,5 +1,5 @@
 //! Fat rings at the frequency and with the damping that its material says, follows a shaken head
-//! as an oscillator does, and keeps most of its volume however the head lies.
+//! as an oscillator does, and keeps its volume however the head lies.
 #![allow(
     clippy::unwrap_used,
     reason = "a test that cannot go on should fail there"
@@ -135,10 +135,10 @@ fn a_shaken_pad_lags_as_a_driven_oscillator() {
     }
 }
 
-/// On a face pads are stitched to muscles, and what rings is both: no slower than fat alone, and
-/// damped more than that and less than by the muscles' full share, whose part dies first.
+/// On a face pads are stitched to muscles, and what rings is both: as the network of all their
+/// masses, springs and dampers does.
 #[test]
-fn pads_of_a_face_ring_between_fat_and_muscle() {
+fn pads_of_a_face_hang_and_ring_as_their_materials_say() {
     let rig = Arc::new(faces::template_rig());
     // To the side, and as in a jump.
     for push in [
@@ -149,17 +149,17 @@ fn pads_of_a_face_ring_between_fat_and_muscle() {
         let swung = rings.iter().filter(|ring| ring.lag > 0.3);
         assert!(swung.clone().count() > 6, "{rings:?}");
         for ring in swung {
-            let rang = ring.measured.expect(&ring.patch);
-            assert!(rang.frequency > 0.95 * ring.alone.frequency, "{ring:?}");
-            let (least, most) = (ring.alone.damping_ratio, ring.predicted.damping_ratio);
-            assert!((least..most).contains(&rang.damping_ratio), "{ring:?}");
+            let lag = ring.lag / ring.predicted_lag;
+            assert!((0.9..1.1).contains(&lag), "{lag} {ring:?}");
+            let [frequency, damping] = ring.ratios().expect(&ring.patch);
+            assert!((0.9..1.1).contains(&frequency), "{frequency} {ring:?}");
+            assert!((0.9..1.1).contains(&damping), "{damping} {ring:?}");
         }
     }
 }
 
-/// What is reached today: the pressure of a pad counts from its muscle shape, not from the muscle
-/// under it, which sinks too. The largest change is 8.6 %, where 3 % is aimed at; without pressure
-/// pads change by several times as much.
+/// Pressure counts from the muscle under the pad, wherever that has gone, and stitches keep the two
+/// together; without either pads change by several times as much.
 #[test]
 fn pads_keep_their_volume_however_the_head_lies() {
     let rig = faces::template_rig();
@@ -169,7 +169,7 @@ fn pads_keep_their_volume_however_the_head_lies() {
     assert_eq!(pads.len(), 12);
     for pad in &pads {
         assert!(pad.rest > 100.0 && pad.sag > 0.2, "{pad:?}");
-        assert!(pad.worst.abs() < 0.09, "{pad:?}");
+        assert!(pad.worst.abs() < 0.03, "{pad:?}");
     }
     let mut slack = rig;
     let edits = Edits::parse("[materials.fat]\npressure = 0.0\n").unwrap();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::group::{Group, GroupPairs, Partner, PatchGroup};
+use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup};
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, Precision};
 use super::lanes::{F32x8, F64x8, Real};
 
@@ -113,8 +113,7 @@ fn link_pairs(
                 continue;
             };
             let b = *b as usize;
-            let stiffness = |p: usize| patches[p].material.stretch_stiffness();
-            let stiffness = strength * stiffness(a).min(stiffness(b));
+            let stiffness = pair_stiffness(patches, [a, b], *strength);
             for &(node, other) in nodes {
                 pairs.push((end(a, node), end(b, other), stiffness));
             }
@@ -146,8 +145,65 @@ fn link_pairs(
             });
         }
     }
-    for (index, (group, list)) in groups.iter_mut().zip(lists).enumerate() {
-        group.set_pairs(index, list);
+    let mut floors = vec![GroupFloor::new(); groups.len()];
+    for (pad, patch) in patches.iter().enumerate() {
+        let at = &layout[pad];
+        floors[at.group].extend(floor_under(patch).into_iter().map(|under| {
+            let floor = end(under.patch, under.patch_node);
+            FloorNode {
+                lane: at.lane as u32,
+                group: floor.0 as u32,
+                port: ports[&floor] as u32,
+                ..under
+            }
+        }));
+    }
+    let links = lists.into_iter().zip(floors);
+    for (index, (group, (pairs, floor))) in groups.iter_mut().zip(links).enumerate() {
+        group.set_pairs(index, pairs);
+        group.set_floor(floor);
     }
     !pairs.is_empty()
+}
+
+/// Stiffness of a pair of nodes of two patches. [mass/s^2]
+pub(super) fn pair_stiffness(patches: &[ClothPatch], ends: [usize; 2], strength: f64) -> f64 {
+    let [a, b] = ends.map(|p| patches[p].material.stretch_stiffness());
+    strength * a.min(b)
+}
+
+/// What lies under each node of a pad: the node it is stitched to, or else that of the nearest
+/// node that is stitched to one. Lane, group and port are left to be filled in.
+pub(super) fn floor_under(pad: &ClothPatch) -> GroupFloor {
+    if pad.material.pressure <= 0.0 {
+        return GroupFloor::new();
+    }
+    let mut stitched: Vec<(u32, usize, u32)> = Vec::new();
+    for attachment in &pad.attachments {
+        if let ClothAttachment::Patch { patch, pairs, .. } = attachment {
+            stitched.extend(
+                pairs
+                    .iter()
+                    .map(|&(own, other)| (own, *patch as usize, other)),
+            );
+        }
+    }
+    stitched.sort_unstable();
+    stitched.dedup_by_key(|stitch| stitch.0);
+    let place = |node: u32| pad.rest[node as usize];
+    (0..pad.rest.len() as u32)
+        .filter_map(|node| {
+            let away = |s: &(u32, usize, u32)| (place(s.0) - place(node)).norm_squared();
+            let nearest = stitched.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+            nearest.map(|&(over, patch, patch_node)| FloorNode {
+                node,
+                lane: 0,
+                over,
+                patch,
+                patch_node,
+                group: 0,
+                port: 0,
+            })
+        })
+        .collect()
 }

@@ -79,7 +79,8 @@ pub struct ClothOptions {
     /// wholly (target shapes are free of stress). In [0, 1].
     pub rest_blend: f64,
     /// Relative variation of `rest_blend` from edge to edge, which decides how a smooth patch
-    /// buckles. The same for every patch, so mirror images stay mirror images.
+    /// buckles; up to twelve times as much where [`NodeVariation::rest_blend`] makes skin loose. The
+    /// same for every patch, so mirror images stay mirror images.
     pub rest_imperfection: f64,
     /// Seed of that variation.
     pub seed: u64,

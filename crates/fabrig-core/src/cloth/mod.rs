@@ -73,6 +73,7 @@ mod hook;
 mod hooked;
 mod input;
 mod lanes;
+mod linear;
 mod materials;
 mod report;
 mod solver;
@@ -89,6 +90,7 @@ pub use input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,
     NodeVariation, PatchMotion, Precision, STANDING_GRAVITY,
 };
+pub use linear::{LinearCloth, NodeVectors};
 pub use materials::{Material, MaterialError, Materials, TIME_UNIT};
 pub use report::{Counters, Energies, StepReport};
 pub use solver::Cloth;

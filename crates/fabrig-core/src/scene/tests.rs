@@ -54,8 +54,10 @@ fn largest_gap(a: &[Point3<f32>], b: &[Point3<f32>]) -> f32 {
 
 #[test]
 fn keyed_gravity_ends_where_the_still_load_does() {
+    // Half-way down: coarse patches of a face that lies down wholly may fold in more than one way,
+    // and which it is depends on how it got there.
     let keyed = "gravity = { join = \"smooth\", keys = [{ time = 0.2, value = [0, -9810, 0] }, \
-                 { time = 0.8, value = [0, 0, -9810] }] }";
+                 { time = 0.8, value = [0, -6900, -6900] }] }";
     let mut turning = simulation(keyed);
     let upright = after(&mut turning, 12);
     let rest = after(&mut simulation("dynamics = \"none\""), 1);
@@ -65,7 +67,7 @@ fn keyed_gravity_ends_where_the_still_load_does() {
     );
     let half_way = after(&mut turning, 18);
     let lying = after(&mut turning, 210);
-    let still = after(&mut simulation("gravity = [0, 0, -9810]"), 240);
+    let still = after(&mut simulation("gravity = [0, -6900, -6900]"), 240);
     let sag = largest_gap(&still, &rest);
     assert!(sag > 1.0, "{sag}");
     assert!(largest_gap(&lying, &still) < 0.01 * sag);

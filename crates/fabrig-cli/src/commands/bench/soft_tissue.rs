@@ -56,33 +56,37 @@ pub(crate) fn run(console: &Console, args: &BenchSoftTissueArgs) -> Result<Outco
     }
     for (name, pads) in &rings {
         console.result(&format!(
-            "\n{:<22}{:>9}{:>8}{:>9}{:>8}{:>10}{:>9}{:>9}{:>7}",
+            "\n{:<22}{:>8}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>8}{:>8}",
             format!("let go, {name}"),
             "lag mm",
+            "said",
             "Hz",
-            "hung Hz",
+            "said",
+            "ratio",
+            "damping",
+            "said",
             "ratio",
             "own Hz",
-            "damping",
-            "expected",
-            "ratio"
         ));
         for pad in pads {
-            let Some(rang) = pad.measured else {
-                console.result(&format!("{:<22}{:>9.2}  does not ring", pad.patch, pad.lag));
+            let (Some(rang), Some(said), Some([frequency, damping])) =
+                (pad.measured, pad.predicted, pad.ratios())
+            else {
+                console.result(&format!("{:<22}{:>8.2}  does not ring", pad.patch, pad.lag));
                 continue;
             };
             console.result(&format!(
-                "{:<22}{:>9.2}{:>8.2}{:>9.2}{:>8.2}{:>10.2}{:>9.3}{:>9.3}{:>7.2}",
+                "{:<22}{:>8.2}{:>8.2}{:>8.2}{:>8.2}{:>8.2}{:>9.3}{:>9.3}{:>8.2}{:>8.2}",
                 pad.patch,
                 pad.lag,
+                pad.predicted_lag,
                 rang.frequency,
-                pad.predicted.frequency,
-                rang.frequency / pad.predicted.frequency,
-                pad.alone.frequency,
+                said.frequency,
+                frequency,
                 rang.damping_ratio,
-                pad.predicted.damping_ratio,
-                rang.damping_ratio / pad.predicted.damping_ratio,
+                said.damping_ratio,
+                damping,
+                pad.alone.frequency,
             ));
         }
     }

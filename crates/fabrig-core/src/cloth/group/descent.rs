@@ -17,7 +17,7 @@ use super::interface::Substep;
 use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, bend_energy};
 use crate::cloth::constraints::grid_lists::GridLists;
-use crate::cloth::constraints::pressure::swept_volume;
+use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
 use crate::cloth::lanes::{Real, Vec3};
@@ -241,12 +241,12 @@ impl<R: Real> Group<R> {
         for i in 0..self.solution.len() {
             self.scratch[i] = self.solution[i] - self.targets[i];
         }
-        swept_volume(
-            &self.lists.cells,
-            &self.targets,
-            &self.scratch,
-            &mut self.gradient,
-        )
+        let faces = PadFaces {
+            cells: &self.lists.cells,
+            targets: &self.targets,
+            heights: &self.floor.heights,
+        };
+        pad_volume(&faces, &self.scratch, &mut self.gradient) - self.floor.rest
     }
 
     /// G, lane by lane.

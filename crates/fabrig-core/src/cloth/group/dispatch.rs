@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::descent::merge;
 use super::instructions::vectorized;
-use super::interface::{GroupPairs, Monitor, PatchGroup, Ports, Substep};
+use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Ports, Substep};
 use super::pairs::PairTable;
 use super::state::{FARTHEST, Group};
 use crate::cloth::input::{Mode, PatchMotion};
@@ -20,11 +20,17 @@ impl<R: Real> PatchGroup for Group<R> {
         self.pairs = PairTable::new(group, &pairs);
     }
 
+    fn set_floor(&mut self, floor: GroupFloor) {
+        self.floor.set(floor);
+    }
+
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]) {
         std::mem::swap(&mut self.targets, &mut self.ends);
         vectorized(LoadEnds(self, (1.0, targets)));
+        self.floor.load(&self.patches, targets);
         self.load_anchors(1.0, anchors);
         vectorized(BeginFrame(self, 1.0));
+        self.floor.hold();
         self.edge_lengths.hold();
         self.diagonal_lengths.hold();
         for lane in 0..R::LANES {
@@ -49,6 +55,7 @@ impl<R: Real> PatchGroup for Group<R> {
             *slope = *v * inv;
         }
         vectorized(LoadEnds(self, (dt, targets)));
+        self.floor.load(&self.patches, targets);
         self.load_anchors(dt, anchors);
         self.clamped = R::splat(0.0);
         vectorized(BeginFrame(self, dt));
@@ -61,6 +68,7 @@ impl<R: Real> PatchGroup for Group<R> {
 
     fn solve(&mut self, substep: &Substep, ports: &[Ports]) {
         vectorized(SolvePairs(self, ports));
+        self.place_floor(substep.progress[1], ports);
         let sweeps = self.sweeps;
         let robust_count = (self.lane_states.iter())
             .filter(|s| s.robust_frames > 0)

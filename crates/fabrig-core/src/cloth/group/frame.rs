@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, bend_energy};
-use crate::cloth::constraints::pressure::swept_volume;
+use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
 use crate::cloth::input::PatchMotion;
@@ -68,6 +68,11 @@ impl<R: Real> Group<R> {
             jump += kick.dot(kick);
             self.end_velocities[i] = b * inv_dt;
         }
+        if self.has_pressure {
+            let cells = &self.lists.cells;
+            self.floor
+                .begin_frame(cells, &self.ends, &mut self.gradient);
+        }
         let half_mass = (R::splat(0.5) * self.mass).sqrt();
         self.drive = half_mass * (jerk.sqrt() * R::splat(dt) + jump.sqrt());
         let stretch = self.edge_lengths.begin_frame(&self.lists.edges, &self.ends);
@@ -118,13 +123,14 @@ impl<R: Real> Group<R> {
         );
         let mut pressure = R::splat(0.0);
         if self.has_pressure {
-            let volume = swept_volume(
-                &self.lists.cells,
-                &self.ends,
-                &self.displacements,
-                &mut self.gradient,
-            );
-            pressure = half * self.pressure * volume * volume;
+            let faces = PadFaces {
+                cells: &self.lists.cells,
+                targets: &self.ends,
+                heights: &self.floor.heights,
+            };
+            let volume = pad_volume(&faces, &self.displacements, &mut self.gradient);
+            let gained = volume - self.floor.rest;
+            pressure = half * self.pressure * gained * gained;
         }
         self.squared_distance = magnet;
         let [anchors, held_off] = self.anchor_energies();

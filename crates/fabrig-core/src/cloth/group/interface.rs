@@ -46,6 +46,26 @@ pub(crate) struct Partner {
     pub(crate) stiffness: f64,
 }
 
+/// What lies under the nodes of a group's pads, one entry for each node that has a floor.
+pub(crate) type GroupFloor = Vec<FloorNode>;
+
+/// What lies under a node of a pad.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FloorNode {
+    /// The node, and its lane.
+    pub(crate) node: u32,
+    pub(crate) lane: u32,
+    /// The node of the pad that the floor's node lies under: this one, or the nearest that has
+    /// one.
+    pub(crate) over: u32,
+    /// Patch of the floor, and its node.
+    pub(crate) patch: usize,
+    pub(crate) patch_node: u32,
+    /// Its group, and its index among the ports of that.
+    pub(crate) group: u32,
+    pub(crate) port: u32,
+}
+
 /// What a group tells the others of its paired nodes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ports {
@@ -83,6 +103,8 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn patches(&self) -> &[usize];
     /// Replaces the pairs; `group` is this one's index.
     fn set_pairs(&mut self, group: usize, pairs: GroupPairs);
+    /// Replaces what lies under its pads.
+    fn set_floor(&mut self, floor: GroupFloor);
     /// Puts the cloth on the targets, moving with them.
     fn reset(&mut self, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Starts a frame of `dt` seconds.

@@ -6,6 +6,7 @@
 mod anchors;
 mod descent;
 mod dispatch;
+mod floor;
 mod frame;
 mod instructions;
 mod interface;
@@ -20,5 +21,7 @@ pub use instructions::instruction_set;
 #[cfg(test)]
 pub(crate) use instructions::tests::with_baseline;
 pub(crate) use instructions::vectorized;
-pub(crate) use interface::{GroupPairs, Monitor, Partner, PatchGroup, Ports, Substep};
+pub(crate) use interface::{
+    FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Ports, Substep,
+};
 pub(crate) use state::Group;

@@ -3,7 +3,7 @@
 use super::interface::Substep;
 use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, project_bend};
-use crate::cloth::constraints::pressure::project_pressure;
+use crate::cloth::constraints::pressure::{PadFaces, project_pressure};
 use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
 use crate::cloth::lanes::Real;
@@ -48,9 +48,14 @@ impl<R: Real> Group<R> {
     pub(super) fn sweep_once(&mut self, progress: R, compliance: &SweepCompliance<R>) {
         let is_varied = self.edge_lengths.is_varied();
         if self.has_pressure {
+            let faces = PadFaces {
+                cells: &self.lists.cells,
+                targets: &self.targets,
+                heights: &self.floor.heights,
+            };
             project_pressure(
-                &self.lists.cells,
-                &self.targets,
+                &faces,
+                self.floor.rest,
                 &mut self.solution,
                 &self.inv_masses,
                 compliance.pressure,

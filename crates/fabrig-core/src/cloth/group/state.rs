@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use super::anchors::{Anchor, anchors};
 use super::descent::Incidence;
+use super::floor::Floor;
 use super::pairs::PairTable;
 use super::sweeps::Multipliers;
 use crate::cloth::constraints::grid_lists::GridLists;
@@ -15,6 +16,9 @@ use crate::cloth::input::{
 };
 use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::materials::Material;
+
+/// How much more the lengths of the loosest skin are varied than those of skin that is not loose.
+const UNEVENNESS: f64 = 12.0;
 
 /// Displacements further than this are taken for a failure. (mm)
 pub(super) const FARTHEST: f64 = 1e5;
@@ -65,6 +69,7 @@ pub(crate) struct Group<R> {
     pub(super) anchor_stiffness: Vec<R>,
     pub(super) anchors: Vec<Anchor<R>>,
     pub(super) pairs: PairTable,
+    pub(super) floor: Floor<R>,
 
     pub(super) lists: GridLists,
     pub(super) edge_lengths: RestLengths<R>,
@@ -171,8 +176,14 @@ impl<R: Real> Group<R> {
         let lengths = |edges: &[[u32; 2]]| -> RestLengths<R> {
             let blend = edges.iter().map(|edge| {
                 let noise = edge_noise(options.seed, edge[0], edge[1]);
-                let blend = options.rest_blend * (1.0 + options.rest_imperfection * noise);
-                R::splat(blend.clamp(0.0, 1.0)) * varied(edge, |v| v.rest_blend)
+                let own = varied(edge, |v| v.rest_blend);
+                let (zero, one) = (R::splat(0.0), R::splat(1.0));
+                // Skin is the less even the looser it is: there the seed decides how it folds.
+                let share = R::splat(options.rest_blend) + (one - own) * R::splat(UNEVENNESS);
+                let astray = share * R::splat(options.rest_imperfection * noise);
+                let blend = R::splat(options.rest_blend) * own + astray;
+                let blend = R::select_less(blend, one, blend, one);
+                R::select_less(zero, blend, blend, zero)
             });
             RestLengths::new(&rest, edges, blend.collect())
         };
@@ -240,6 +251,7 @@ impl<R: Real> Group<R> {
             anchor_stiffness,
             anchors,
             pairs: PairTable::default(),
+            floor: Floor::none(n),
             edge_lengths,
             diagonal_lengths,
             bend_softness,

@@ -7,7 +7,7 @@
 
 use super::interface::Substep;
 use super::state::Group;
-use crate::cloth::constraints::pressure::swept_volume;
+use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::stretch::RestLengths;
 use crate::cloth::lanes::{Real, Vec3};
 
@@ -102,12 +102,12 @@ impl<R: Real> Group<R> {
 
     #[inline(always)]
     fn sweep_pressure(&mut self, compliance: R, multiplier: &mut R) {
-        let volume = swept_volume(
-            &self.lists.cells,
-            &self.targets,
-            &self.solution,
-            &mut self.gradient,
-        );
+        let faces = PadFaces {
+            cells: &self.lists.cells,
+            targets: &self.targets,
+            heights: &self.floor.heights,
+        };
+        let gained = pad_volume(&faces, &self.solution, &mut self.gradient) - self.floor.rest;
         let compliance = compliance.max(R::splat(1e-30));
         // Without pressure the compliance is infinite, and so would be its product with zero.
         let is_on = R::select_less(compliance, R::splat(1e30), R::splat(1.0), R::splat(0.0));
@@ -116,7 +116,7 @@ impl<R: Real> Group<R> {
         for (g, &w) in self.gradient.iter().zip(&self.inv_masses) {
             bottom += g.dot(*g) * w;
         }
-        let change = -((volume + held) / bottom);
+        let change = -((gained + held) / bottom);
         *multiplier += change * is_on;
         let nodes = self.solution.iter_mut().zip(&self.gradient);
         for ((x, g), &w) in nodes.zip(&self.inv_masses) {

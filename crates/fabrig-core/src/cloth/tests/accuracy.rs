@@ -111,7 +111,10 @@ fn rounding_is_far_below_the_time_error() {
     let single = run(Material::FAT, ClothOptions::default(), 24);
     let double = run(
         Material::FAT,
-        options(8, Integrator::Bdf2, Precision::Double),
+        ClothOptions {
+            precision: Precision::Double,
+            ..ClothOptions::default()
+        },
         24,
     );
     let e = error(&single, &double);

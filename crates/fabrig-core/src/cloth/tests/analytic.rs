@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::support::*;
+use crate::cloth::materials::PRESSURE_SHARE;
 use crate::cloth::{
     Cloth, ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, Material, PatchMotion,
     Precision, TIME_UNIT,
@@ -214,9 +215,10 @@ fn pairs_keep_momentum_and_make_two_nodes_swing_as_one() {
 
 #[test]
 fn pressure_stiffens_a_pad_that_is_lifted_as_a_whole() {
-    // Pressed along its normal, a flat pad feels magnet and pressure: u = a / (w^2 + p/T^2).
+    // Pressed along its normal, a flat pad feels magnet and pressure: u = a / (w^2 + k), of which
+    // k is as much as in 0.3/T^2.
     let material = Material {
-        pressure: 0.3,
+        pressure: 0.3 / PRESSURE_SHARE,
         damping: 20.0,
         ..magnet_only(7.0, 0.1)
     };

@@ -7,6 +7,9 @@ pub enum SoftTissueError {
     /// The rig has no pad of fat.
     #[error("the rig has no fat pads, so there is nothing to measure")]
     NoPads,
+    /// Some patch has neither magnet nor anchor, so it does not hang but falls.
+    #[error("a patch is held by nothing, so it cannot hang; give its material a magnet frequency")]
+    Loose,
     /// The face cannot be simulated.
     #[error(transparent)]
     Scene(#[from] SceneError),

@@ -1,6 +1,6 @@
 //! Frequency and damping of something that rings.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use serde::Serialize;
 
@@ -27,61 +27,51 @@ impl Oscillation {
     }
 }
 
-/// Measures a ring about zero: half a period is the time between crossings of zero, and the
-/// logarithmic decrement comes from the extremes between them.
+/// The oscillation that a ring about zero is most like.
+///
+/// Of one oscillation three samples at equal steps are linearly related,
+/// `y_(k+1) = 2 e^(-z w s) cos(w_d s) y_k - e^(-2 z w s) y_(k-1)`; the two numbers are taken that
+/// fit all samples best, in least squares. Where several oscillations sound together, it is the
+/// one oscillator that comes nearest to what is heard, whatever small one dies last. The step s
+/// is half of the time to the first crossing of zero, an eighth of a period.
 ///
 /// - `samples`: at steps of `dt` (s), from when it was let go
 ///
-/// Returns `None` where it does not swing at least once and a half.
+/// Returns `None` where it does not swing.
+///
+/// Source: de Prony 1795, for one pair of exponentials.
 pub fn oscillation(samples: &[f64], dt: f64) -> Option<Oscillation> {
-    let mut crossings = Vec::new();
-    let mut extremes = vec![];
-    let mut most = 0.0f64;
-    for (k, pair) in samples.windows(2).enumerate() {
-        let (a, b) = (pair[0], pair[1]);
-        most = most.max(peak_near(samples, k));
-        if a != 0.0 && a.signum() != b.signum() {
-            crossings.push((k as f64 + a / (a - b)) * dt);
-            extremes.push(most);
-            most = 0.0;
-        }
+    let crossing = samples
+        .windows(2)
+        .position(|pair| pair[0] != 0.0 && pair[0].signum() != pair[1].signum())?;
+    let stride = crossing.div_ceil(2).max(1);
+    let (mut squares, mut products, mut past) = (0.0, 0.0, 0.0);
+    let (mut onward, mut across) = (0.0, 0.0);
+    for k in stride..samples.len().saturating_sub(stride) {
+        let [before, now, after] = [samples[k - stride], samples[k], samples[k + stride]];
+        squares += now * now;
+        products += now * before;
+        past += before * before;
+        onward += after * now;
+        across += after * before;
     }
-    // What comes before the first crossing is where it was held.
-    let count = crossings.len();
-    if count < 3 {
+    let determinant = squares * past - products * products;
+    if determinant.is_nan() || determinant <= 1e-12 * squares * past {
         return None;
     }
-    let largest = extremes.get(1).copied()?;
-    // Beyond this it is noise.
-    let used = (1..count)
-        .take_while(|&k| extremes[k] > 0.02 * largest)
-        .last()?;
-    if used < 2 {
+    let linear = (onward * past - across * products) / determinant;
+    let constant = (across * squares - onward * products) / determinant;
+    let decay = -constant;
+    if decay <= 0.0 || 0.25 * linear * linear >= decay {
         return None;
     }
-    let half_period = (crossings[used] - crossings[0]) / used as f64;
-    let decrement = (extremes[1] / extremes[used]).ln() / (used - 1) as f64;
-    let damping_ratio = decrement / (PI * PI + decrement * decrement).sqrt();
+    let step = stride as f64 * dt;
+    let damped = (0.5 * linear / decay.sqrt()).acos() / step;
+    let loss = -0.5 * decay.ln() / step;
     Some(Oscillation {
-        frequency: 0.5 / half_period,
-        damping_ratio,
+        frequency: damped / TAU,
+        damping_ratio: loss / damped.hypot(loss),
     })
-}
-
-/// Size of the extreme of the parabola through a sample and its neighbours, or of the sample.
-fn peak_near(samples: &[f64], k: usize) -> f64 {
-    let own = samples[k].abs();
-    let (Some(before), Some(after)) = (k.checked_sub(1).map(|k| samples[k]), samples.get(k + 1))
-    else {
-        return own;
-    };
-    let (a, b, c) = (before.abs(), own, after.abs());
-    let bend = a - 2.0 * b + c;
-    if b >= a && b >= c && bend < 0.0 && before.signum() == after.signum() {
-        b - 0.125 * (a - c).powi(2) / bend
-    } else {
-        own
-    }
 }
 
 #[cfg(test)]
@@ -104,13 +94,21 @@ mod tests {
             let found = oscillation(&samples, dt).unwrap();
             let expected = Oscillation::of_spring(rate, 2.0 * ratio * rate);
             assert!(
-                (found.frequency / expected.frequency - 1.0).abs() < 0.01,
+                (found.frequency / expected.frequency - 1.0).abs() < 1e-6,
                 "{found:?}"
             );
             assert!(
-                (found.damping_ratio / ratio - 1.0).abs() < 0.03,
+                (found.damping_ratio / ratio - 1.0).abs() < 1e-6,
                 "{found:?}"
             );
+            // A small one that dies last is not what is heard.
+            let mixed: Vec<f64> = samples
+                .iter()
+                .enumerate()
+                .map(|(k, y)| y + 0.01 * (70.0 * k as f64 * dt).cos())
+                .collect();
+            let found = oscillation(&mixed, dt).unwrap();
+            assert!((found.frequency / expected.frequency - 1.0).abs() < 0.03);
         }
         assert_eq!(oscillation(&[1.0, 0.5, 0.2, 0.1, 0.0], 0.1), None);
         assert_eq!(oscillation(&[], 0.1), None);

@@ -17,7 +17,7 @@ use crate::scene::fields::OverTime;
 use crate::scene::{FacePose, Scene, Simulation};
 
 /// Frames that a face is held under each gravity; fat that rings at 5 Hz has died away.
-const HELD_FRAMES: u32 = 90;
+const HELD_FRAMES: u32 = 60;
 /// (s)
 const STEP: f64 = 1.0 / 60.0;
 
@@ -145,16 +145,6 @@ impl Pad {
                 })
             })
             .collect()
-    }
-
-    /// The pad and the patches that it stands on.
-    pub(super) fn swinging_with(&self, rig: &Rig) -> Vec<usize> {
-        let attachments = rig.patches[self.patch].patch.chart.attachments.iter();
-        let under = attachments.filter_map(|attachment| match attachment {
-            Attachment::Patch { patch, .. } => Some(*patch as usize),
-            Attachment::Body { .. } => None,
-        });
-        std::iter::once(self.patch).chain(under).collect()
     }
 
     /// (mm^3)
