@@ -1,5 +1,5 @@
 //! What patches are held to: bone at the origin, neighbours at the insertion, what lies under
-//! a fat pad (Eq. 5).
+//! a fat pad, what a ring opens on (Eq. 5).
 
 use super::error::AnatomyError;
 use super::layout::{HoldText, Layout};
@@ -22,14 +22,17 @@ pub(super) fn attach(
             ("origin", &text.origin),
             ("insertion", &text.insertion),
             ("over", &text.over),
+            ("opening", &text.opening),
         ];
         for (key, hold) in holds {
             let Some(hold) = hold else { continue };
             let held = columns(hold.share);
+            let rows = (hold.share * f64::from(chart.grid.v_count)).ceil() as u32;
             let nodes: Vec<u32> = (0..chart.nodes.len() as u32)
                 .filter(|node| match key {
                     "origin" => node % u_count < held,
                     "insertion" => node % u_count >= u_count - held,
+                    "opening" => node / u_count < rows,
                     _ => true,
                 })
                 .collect();
@@ -156,7 +159,15 @@ fn mirror_attachments(charts: &[PatchChart], attachments: &[Attachment]) -> Vec<
     attachments
         .iter()
         .map(|attachment| match attachment {
-            Attachment::Body { .. } => attachment.clone(),
+            Attachment::Body {
+                body,
+                nodes,
+                strength,
+            } => Attachment::Body {
+                body: body.mirrored(),
+                nodes: nodes.clone(),
+                strength: *strength,
+            },
             Attachment::Patch {
                 patch,
                 pairs,

@@ -76,6 +76,9 @@ pub(super) struct PatchText {
     /// What the pad lies on: each node is stitched to the nearest node under it.
     #[serde(default)]
     pub(super) over: Option<HoldText>,
+    /// Of a sphincter: what its first rings are held to, those around the opening.
+    #[serde(default)]
+    pub(super) opening: Option<HoldText>,
 }
 
 /// The closed loop of mesh edges around an opening, through two corners.
@@ -169,7 +172,11 @@ impl PatchText {
             ("origin", &self.origin),
             ("insertion", &self.insertion),
             ("over", &self.over),
+            ("opening", &self.opening),
         ];
+        if let (Some(hold), true) = (&self.opening, self.kind != PatchKind::Sphincter) {
+            return Err(self.bad_value("opening", "a sphincter; others have none", hold));
+        }
         for (key, hold) in holds {
             let Some(hold) = hold else { continue };
             if hold.body.is_none() && hold.patches.is_empty() {

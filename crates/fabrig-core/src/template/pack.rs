@@ -66,6 +66,17 @@ pub enum RigidBody {
     EyeRight,
 }
 
+impl RigidBody {
+    /// The body on the other side of the head.
+    pub fn mirrored(self) -> Self {
+        match self {
+            Self::Skull | Self::Mandible => self,
+            Self::EyeLeft => Self::EyeRight,
+            Self::EyeRight => Self::EyeLeft,
+        }
+    }
+}
+
 /// A part that is not skin: eyeball, teeth, tongue.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigidPart {
