@@ -1,6 +1,6 @@
 //! With loose skin the forehead and the corners of the eyes wrinkle as the muscles under them are
-//! drawn together: as finely as a beam on springs, in the same way whatever the seed, and on the
-//! skin as deep as on the patch, where the skin is fine enough to hold it.
+//! drawn together: as finely as a beam on springs, as deep whatever the seed, and on the skin as deep
+//! as the kernel that moves it lets it be.
 #![allow(
     clippy::unwrap_used,
     reason = "a test that cannot go on should fail there"
@@ -72,20 +72,24 @@ fn loose_skin_wrinkles_and_firm_skin_does_not() {
             );
             let kept = m.skin.depth_rms / m.patch.depth_rms;
             assert!(
-                (0.75..1.35).contains(&kept),
-                "{name}: the skin shows {kept}"
+                (kept - m.kept_predicted).abs() < 0.2,
+                "{name}: the skin shows what its kernel lets it: {kept} {m:?}"
             );
             let ratio = m.patch.wavelength / m.winkler.unwrap().wavelength;
             assert!(
                 (0.6..1.6).contains(&ratio),
                 "{name}: as fine as a beam: {ratio}"
             );
-            let other = m.patch.depth_rms / seeds[0].patch.depth_rms;
+            let depth = m.patch.depth_rms / seeds[0].patch.depth_rms;
             assert!(
-                (other - 1.0).abs() < 0.15,
-                "{name}: whatever the seed: {other}"
+                (depth - 1.0).abs() < 0.3,
+                "{name}: as deep whatever the seed: {depth}"
             );
         }
+        // But not in the same places.
+        let others = seeds[1..].iter();
+        let changes = others.map(|m| (m.patch.depth_rms / seeds[0].patch.depth_rms - 1.0).abs());
+        assert!(changes.fold(0.0, f64::max) > 0.005, "{name}: {seeds:?}");
         // A coarse mesh cannot show all of it.
         let lost = measured(&coarse, case, 0);
         assert!(

@@ -73,7 +73,7 @@ pub(super) const CONTACT: [Story; 4] = [
 ];
 
 /// What skin and fat do by themselves.
-pub(super) const PHYSICS: [Story; 5] = [
+pub(super) const PHYSICS: [Story; 6] = [
     Story {
         file: "physics_forehead.png",
         framing: Framing::Forehead,
@@ -119,6 +119,15 @@ pub(super) const PHYSICS: [Story; 5] = [
             10.4, 10.4333, 10.4666, 10.5, 10.5333, 10.5666, 10.6, 10.6333, 10.6666, 10.7, 10.7333,
             10.7666,
         ],
+        ..PLAIN
+    },
+    Story {
+        file: "physics_jump.png",
+        is_steady: true,
+        size: [380, 400],
+        columns: 4,
+        // Standing, at the top, at the end of the landing, and as it swings back.
+        moments: &[11.3, 12.1, 12.45, 12.52],
         ..PLAIN
     },
 ];

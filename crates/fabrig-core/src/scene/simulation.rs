@@ -156,7 +156,12 @@ impl Simulation {
         if let (Some(of_cloth), Some(of_skin)) = (&mut contact, &skin_contact) {
             of_cloth.contact.set_lips(of_skin.sticky_lips());
         }
-        let deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
+        let mut deformer = SkinDeformer::new(&rig.binding, rig.neutral_nodes(), skin.clone())?;
+        for (patch, nodes) in rig.variations.iter().enumerate() {
+            // Skin folds where lengths stay.
+            let is_folding: Vec<bool> = nodes.iter().map(|node| node.rest_blend < 1.0).collect();
+            deformer = deformer.turning_across(patch, &is_folding);
+        }
         let count = rig.patches.len();
         let time = clip.as_ref().map_or(0.0, |c| c.times()[0]);
         let head_keys = match &scene.head_motion {

@@ -62,6 +62,17 @@ impl SkinDeformer {
         })
     }
 
+    /// The same, where a patch folds at some nodes: see [`NodeFrames::turning_across`].
+    ///
+    /// - `is_folding`: one per node of `patch`, or none where nothing folds
+    pub fn turning_across(mut self, patch: usize, is_folding: &[bool]) -> Self {
+        if is_folding.contains(&true) {
+            let frames = self.frames.remove(patch).turning_across(is_folding);
+            self.frames.insert(patch, frames);
+        }
+        self
+    }
+
     /// Skin at rest. [mm, head frame]
     pub fn rest(&self) -> &[Point3<f32>] {
         &self.rest

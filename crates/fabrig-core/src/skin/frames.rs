@@ -28,19 +28,48 @@ impl NodeAffine {
     }
 }
 
+/// How many nodes away the turn of a node that folds is looked for: across a fold, which is
+/// about as wide as twice that.
+const ACROSS_FOLDS: u32 = 3;
+
 /// Rest frames of one patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeFrames {
     grid: GridShape,
     rest: Vec<Point3<f32>>,
     frames: Vec<Matrix3<f32>>,
+    /// How many nodes away each node looks for its turn; empty where all look at the next.
+    reaches: Vec<u32>,
 }
 
 impl NodeFrames {
     /// Takes a patch at rest. (mm)
     pub fn new(grid: GridShape, rest: Vec<Point3<f32>>) -> Self {
-        let frames = (0..rest.len()).map(|i| frame(grid, &rest, i)).collect();
-        Self { grid, rest, frames }
+        let frames = (0..rest.len()).map(|i| frame(grid, &rest, i, 1)).collect();
+        Self {
+            grid,
+            rest,
+            frames,
+            reaches: Vec::new(),
+        }
+    }
+
+    /// The same, for a patch that folds at some nodes. Skin over a fold goes up and down with it
+    /// and does not turn with its flanks: it lies further out than a fold is wide, and would
+    /// be pushed through itself.
+    ///
+    /// - `is_folding`: one per node
+    pub fn turning_across(mut self, is_folding: &[bool]) -> Self {
+        let reach = |&folds: &bool| if folds { ACROSS_FOLDS } else { 1 };
+        self.reaches = is_folding.iter().map(reach).collect();
+        self.frames = (0..self.rest.len())
+            .map(|i| frame(self.grid, &self.rest, i, self.reach(i)))
+            .collect();
+        self
+    }
+
+    fn reach(&self, node: usize) -> u32 {
+        self.reaches.get(node).copied().unwrap_or(1)
     }
 
     /// The patch at rest. (mm)
@@ -53,7 +82,7 @@ impl NodeFrames {
     /// A patch that stands at rest gives exactly zero.
     pub fn affines(&self, now: &[Point3<f32>], out: &mut [NodeAffine]) {
         for (i, out) in out.iter_mut().enumerate() {
-            let frame_now = frame(self.grid, now, i);
+            let frame_now = frame(self.grid, now, i, self.reach(i));
             // Equal bits must give no turn at all: F F^T is only nearly one.
             let turn = if frame_now == self.frames[i] {
                 Matrix3::zeros()
@@ -71,20 +100,22 @@ impl NodeFrames {
 
 /// Orthonormal frame of a grid at a node. The first two axes bisect the grid directions, so
 /// that neither u nor v is preferred under shear. Identity where the grid is degenerate.
-fn frame(grid: GridShape, nodes: &[Point3<f32>], node: usize) -> Matrix3<f32> {
+///
+/// - `reach`: how many nodes away the grid directions are taken from
+fn frame(grid: GridShape, nodes: &[Point3<f32>], node: usize, reach: u32) -> Matrix3<f32> {
     let (u, v) = (
         node as u32 % grid.u_count.max(1),
         node as u32 / grid.u_count.max(1),
     );
     let at = |u: u32, v: u32| nodes[grid.index(u, v)];
     let along_u = if grid.is_periodic {
-        let next = (u + 1) % grid.u_count;
-        let previous = (u + grid.u_count - 1) % grid.u_count;
+        let next = (u + reach) % grid.u_count;
+        let previous = (u + grid.u_count - reach % grid.u_count) % grid.u_count;
         at(next, v) - at(previous, v)
     } else {
-        at((u + 1).min(grid.u_count - 1), v) - at(u.saturating_sub(1), v)
+        at((u + reach).min(grid.u_count - 1), v) - at(u.saturating_sub(reach), v)
     };
-    let along_v = at(u, (v + 1).min(grid.v_count - 1)) - at(u, v.saturating_sub(1));
+    let along_v = at(u, (v + reach).min(grid.v_count - 1)) - at(u, v.saturating_sub(reach));
     let bisected = || {
         let (a, b) = (
             along_u.try_normalize(f32::EPSILON)?,
@@ -141,9 +172,37 @@ mod tests {
     }
 
     #[test]
+    fn folds_turn_nothing_where_frames_look_across_them() {
+        let grid = GridShape {
+            u_count: 13,
+            v_count: 9,
+            is_periodic: false,
+        };
+        let nodes = |depth: f32| -> Vec<Point3<f32>> {
+            (0..grid.node_count())
+                .map(|i| {
+                    let (u, v) = ((i % 13) as f32, (i / 13) as f32);
+                    let fold = (u * std::f32::consts::TAU / 6.0).sin();
+                    Point3::new(2.0 * u, 2.0 * v, depth * fold)
+                })
+                .collect()
+        };
+        let most_turn = |frames: &NodeFrames| {
+            let mut affines = vec![NodeAffine::identity(); grid.node_count()];
+            frames.affines(&nodes(1.0), &mut affines);
+            let inner = (3..10).map(|u| affines[4 * 13 + u].turn.norm());
+            inner.fold(0.0f32, f32::max)
+        };
+        let near = NodeFrames::new(grid, nodes(0.0));
+        assert!(most_turn(&near) > 0.5);
+        let across = near.turning_across(&[true; 117]);
+        assert!(most_turn(&across) < 1e-5);
+    }
+
+    #[test]
     fn rest_moves_nothing_bit_for_bit() {
         let (grid, rest) = bent_grid();
-        let frames = NodeFrames::new(grid, rest.clone());
+        let frames = NodeFrames::new(grid, rest.clone()).turning_across(&[true; 30]);
         let mut affines = vec![NodeAffine::identity(); rest.len()];
         frames.affines(&rest, &mut affines);
         for affine in affines {

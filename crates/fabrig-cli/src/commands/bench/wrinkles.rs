@@ -50,7 +50,7 @@ pub(crate) fn run(console: &Console, args: &BenchWrinklesArgs) -> Result<Outcome
         return Ok(Outcome::Done);
     }
     console.result(&format!(
-        "{:<16}{:<12}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8}{:>8}",
+        "{:<16}{:<12}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8}{:>8}",
         "case",
         "skin",
         "patch",
@@ -58,6 +58,7 @@ pub(crate) fn run(console: &Console, args: &BenchWrinklesArgs) -> Result<Outcome
         "skin",
         "ridge",
         "kept",
+        "said",
         "wave",
         "on skin",
         "Winkler",
@@ -66,14 +67,14 @@ pub(crate) fn run(console: &Console, args: &BenchWrinklesArgs) -> Result<Outcome
         "wave+-"
     ));
     console.result(&format!(
-        "{:<16}{:<12}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8}{:>8}",
-        "", "", "rms mm", "mm", "rms mm", "mm", "", "mm", "mm", "mm", "", "", ""
+        "{:<16}{:<12}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>8}{:>8}",
+        "", "", "rms mm", "mm", "rms mm", "mm", "", "", "mm", "mm", "mm", "", "", ""
     ));
     for row in &rows {
         let mean = |of: &dyn Fn(&WrinkleMeasure) -> f64| mean_of(&row.seeds, of);
         let predicted = mean(&|m| m.winkler.map_or(f64::NAN, |w| w.wavelength));
         console.result(&format!(
-            "{:<16}{:<12}{:>9.3}{:>9.2}{:>9.3}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>7.0}%{:>7.0}%",
+            "{:<16}{:<12}{:>9.3}{:>9.2}{:>9.3}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>9.2}{:>7.0}%{:>7.0}%",
             row.case.name,
             row.skin,
             mean(&|m| m.patch.depth_rms),
@@ -81,6 +82,7 @@ pub(crate) fn run(console: &Console, args: &BenchWrinklesArgs) -> Result<Outcome
             mean(&|m| m.skin.depth_rms),
             mean(&|m| m.skin.trough_to_ridge),
             mean(&|m| m.skin.depth_rms) / mean(&|m| m.patch.depth_rms),
+            mean(&|m| m.kept_predicted),
             mean(&|m| m.patch.wavelength),
             mean(&|m| m.skin.wavelength),
             predicted,

@@ -49,9 +49,10 @@ pub const WRINKLE_CASES: [WrinkleCase; 2] = [
             ("browOuterUpRight", 1.0),
         ],
         site: Site {
-            patch: "frontalis_l",
-            along: [0.1, 0.95],
-            across: [0.1, 0.7],
+            // The skin hangs on the fat over the frontalis.
+            patch: "forehead_fat",
+            along: [0.0, 0.6],
+            across: [0.1, 0.9],
         },
     },
     WrinkleCase {
@@ -79,6 +80,8 @@ pub struct WrinkleMeasure {
     pub patch: WrinkleFigures,
     /// On the skin over it, where the patch lies under skin at all.
     pub skin: WrinkleFigures,
+    /// What part of the depth the skin should keep by the width of its kernel.
+    pub kept_predicted: f64,
     /// Mean strain of the lines in the muscle shapes, negative where they are drawn together.
     pub strain: f64,
     /// The strongest strain of an edge of the lines, the same way.
@@ -139,29 +142,40 @@ pub fn measure_wrinkles(
     let skin = SkinHeights::new(rig, &wide(shapes.skin()), &wide(cloth.skin()))?;
     let on_skin = skin.along(&lines, &rig.patches[patch].patch.neutral);
 
+    let figures = figures_of_lines(&on_patch);
     let neutral = &rig.patches[patch].patch.neutral;
-    let mut strains = Vec::new();
-    let mut edge_sum = 0.0;
-    for pair in lines.iter().flat_map(|line| line.windows(2)) {
-        let of = |points: &[Point]| (points[pair[1]] - points[pair[0]]).norm();
-        strains.push(of(&targets) / of(neutral).max(1e-9) - 1.0);
-        edge_sum += of(&targets);
-    }
-    let count = strains.len().max(1) as f64;
+    let kept_predicted = skin.kept(rig, &lines, neutral, figures.wavelength);
+    // Length and strain of every edge of the lines.
+    let edges: Vec<(f64, f64)> = lines
+        .iter()
+        .flat_map(|line| line.windows(2))
+        .map(|pair| {
+            let of = |points: &[Point]| (points[pair[1]] - points[pair[0]]).norm();
+            (of(&targets), of(&targets) / of(neutral).max(1e-9) - 1.0)
+        })
+        .collect();
     let material = cloth_patches(rig)?[patch].material;
     let middle = lines.get(lines.len() / 2).and_then(|l| l.get(l.len() / 2));
-    let variation = rig.variations.get(patch).and_then(|v| v.get(*middle?));
+    let variation = middle.and_then(|&node| rig.variations.get(patch)?.get(node));
+    let predicted = |edge: f64| winkler(&material, variation.unwrap_or(&NodeVariation::NONE), edge);
+    // Only what is drawn together enough folds, and edges are short there.
+    let critical = predicted(1.0).map_or(0.0, |w| w.critical_strain);
+    let folding = mean(edges.iter().filter(|e| e.1 < -critical).map(|e| e.0));
+    let edge = folding.or(mean(edges.iter().map(|e| e.0)));
     Ok(WrinkleMeasure {
-        patch: figures_of_lines(&on_patch),
+        patch: figures,
         skin: figures_of_lines(&on_skin),
-        strain: strains.iter().sum::<f64>() / count,
-        strain_peak: strains.iter().copied().fold(0.0, f64::min),
-        winkler: winkler(
-            &material,
-            variation.unwrap_or(&NodeVariation::NONE),
-            edge_sum / count,
-        ),
+        kept_predicted,
+        strain: mean(edges.iter().map(|e| e.1)).unwrap_or(0.0),
+        strain_peak: edges.iter().map(|e| e.1).fold(0.0, f64::min),
+        winkler: edge.and_then(predicted),
     })
+}
+
+/// Mean of some numbers, if there are any.
+fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = numbers.fold((0.0, 0u32), |(sum, count), x| (sum + x, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 fn missing(what: &'static str, name: &str) -> WrinkleError {
@@ -257,5 +271,51 @@ impl SkinHeights {
                 arc_lengths(&places).into_iter().zip(heights).collect()
             })
             .collect()
+    }
+
+    /// The part of a wave that skin keeps: `exp(-2 pi^2 s^2 / L^2)` in the mean over the samples,
+    /// with s the width along the line of the kernel that moves the skin there: the weights of
+    /// its triangle's corners, each spread over its own row of nodes.
+    ///
+    /// - `wavelength`: L (mm)
+    fn kept(&self, rig: &Rig, lines: &[Vec<usize>], rest_nodes: &[Point], wavelength: f64) -> f64 {
+        let nodes: Vec<Point> = rig
+            .neutral_nodes()
+            .into_iter()
+            .flat_map(|(_, nodes)| nodes.into_iter().map(|p| p.cast()))
+            .collect();
+        let (mut sum, mut count) = (0.0, 0u32);
+        for pair in lines.iter().flat_map(|line| line.windows(2)) {
+            let (a, b) = (rest_nodes[pair[0]], rest_nodes[pair[1]]);
+            let Some(along) = (b - a).try_normalize(f64::EPSILON) else {
+                continue;
+            };
+            for k in 0..FINER {
+                let p = a + (b - a) * (k as f64 / FINER as f64);
+                let place = self.surface.closest(&p);
+                let corners = self.triangles[place.triangle as usize];
+                let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
+                for (v, share) in corners.into_iter().zip(place.barycentric) {
+                    for (node, w) in rig.binding.row(v as usize) {
+                        // The mandible comes after the nodes.
+                        let Some(node) = nodes.get(node as usize) else {
+                            continue;
+                        };
+                        let (w, t) = (share * f64::from(w), (node - p).dot(&along));
+                        weight += w;
+                        first += w * t;
+                        second += w * t * t;
+                    }
+                }
+                if weight > 0.0 {
+                    // Rows that interpolate by cubics have a width of nothing, or a little less.
+                    let squared = (second / weight - (first / weight).powi(2)).max(0.0);
+                    let turns = std::f64::consts::TAU / wavelength.max(f64::MIN_POSITIVE);
+                    sum += weight * (-0.5 * turns * turns * squared).exp();
+                }
+                count += 1;
+            }
+        }
+        sum / f64::from(count.max(1))
     }
 }

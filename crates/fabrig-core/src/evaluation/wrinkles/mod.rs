@@ -10,7 +10,8 @@
 //! (Winkler 1867, Hetényi 1946): it buckles at the wavelength where bending and foundation share
 //! the work, `L = 2 pi (B/K)^(1/4)`; on a grid of edge l, where bending acts on second
 //! differences, at `2 - 2 cos(2 pi l / L) = sqrt(K/B)`, once the strain passes
-//! `2 sqrt(B K) / k`, with k the stiffness of an edge.
+//! `2 sqrt(B K) / k`, with k the stiffness of an edge. And beside what the skin keeps of the depth
+//! stands what the width of its kernel lets it keep, `exp(-2 pi^2 s^2 / L^2)`.
 
 mod cases;
 mod error;
