@@ -1,9 +1,8 @@
 //! What fat does: whether it keeps its volume however the head lies, and how it rings.
 //!
 //! [`pad_volumes`] holds the neutral face under gravity from every side and measures what each fat
-//! pad encloses with the muscles under it. [`pad_rings`] shakes the face once and compares how
-//! pads ring with an oscillator whose frequency comes from how far they sag, and whose damping
-//! from their materials.
+//! pad encloses with the muscles under it. [`pad_rings`] pushes the head, lets it go, and compares
+//! how pads hang and ring with the network of oscillators that their materials say they are.
 
 mod error;
 mod oscillator;
