@@ -17,11 +17,13 @@ use nalgebra::{Point3, Vector3};
 use super::distance::PairKind;
 use super::tile::{Tile, Way, least, most};
 
-/// Least cosine between the normals of flat tiles and their mean: 50 degrees, so that what
-/// [`FLAT_WAY`] allows leaves them under 90.
+/// Least cosine between the normals of flat tiles and their mean: 50 degrees.
 const FLAT: f32 = 0.64;
-/// Within this a cell of the default resolution turns by less than 40 degrees. (mm)
-pub(super) const FLAT_WAY: f32 = 0.6;
+/// What nodes go against each other before a cell of the default resolution has turned by a
+/// radian. (mm)
+const WAY_PER_RADIAN: f32 = 0.85;
+/// A slab this much wider than needed makes any length superfluous. (mm)
+const AMPLE: f32 = 0.3;
 /// What stored positions and their differences may be off by. (mm)
 const ROUNDING: f32 = 1e-4;
 
@@ -76,16 +78,19 @@ impl TilePair {
         }
     }
 
-    /// Whether a certificate shows that the tiles stay `more` beyond the thickness apart.
+    /// How far beyond the thickness a certificate shows the tiles to stay apart; less than zero
+    /// where none does. (mm)
     ///
     /// - `way`: of the first tile against the second, from the references
     #[inline]
-    pub(crate) fn is_clear(&self, way: &Way, more: f32) -> bool {
-        if self.gap + way.along(&self.normal)[0] > more + ROUNDING {
-            return true;
-        }
-        let spare = self.length - more - ROUNDING;
-        spare > 0.0 && way.longest_squared() < spare * spare
+    pub(crate) fn clearance(&self, way: &Way) -> f32 {
+        let gap = self.gap + way.along(&self.normal)[0];
+        let clearance = if gap > AMPLE {
+            gap
+        } else {
+            most(gap, self.length - way.longest())
+        };
+        clearance - ROUNDING
     }
 
     /// Takes what the tiles have gone off the certificates, so that they hold from references
@@ -205,13 +210,96 @@ pub(crate) fn slab(
     best
 }
 
-/// Whether all of these normals, of any length, are so much alike that a sheet which has them
-/// cannot reach itself.
-pub(crate) fn are_flat(normals: &[Vector3<f32>]) -> bool {
+/// How far nodes of a sheet with these normals, of any length, may go against each other while
+/// it cannot reach itself; zero where it is not flat. (mm)
+pub(crate) fn flat_way(normals: &[Vector3<f32>]) -> f32 {
     let sum: Vector3<f32> = normals.iter().sum();
-    let least = FLAT * FLAT * sum.norm_squared();
-    normals.iter().all(|n| {
-        let along = n.dot(&sum);
-        along > 0.0 && along * along > least * n.norm_squared()
-    })
+    let length = sum.norm();
+    let mut cosine = 1.0;
+    for n in normals {
+        let own = n.dot(&sum) / (n.norm() * length);
+        // No number where a cell has no area: it may lie any way.
+        cosine = if own < cosine || own.is_nan() {
+            own
+        } else {
+            cosine
+        };
+    }
+    if cosine > FLAT {
+        // What is left to 90 degrees.
+        WAY_PER_RADIAN * cosine.asin()
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::GridShape;
+    use crate::collision::mesh::Part;
+    use crate::collision::tile::Tiles;
+    use rand::{RngExt, SeedableRng};
+
+    /// Two layers that go the same way, turn, and slide along each other.
+    #[test]
+    fn a_certificate_never_promises_more_than_there_is() {
+        let shape = GridShape {
+            u_count: 5,
+            v_count: 5,
+            is_periodic: false,
+        };
+        let parts = [Part::of_grid(shape, 0), Part::of_grid(shape, 25)];
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(17);
+        let at = |i: u32| {
+            let (x, y) = (2.0 * (i % 5) as f32, 2.0 * (i / 5 % 5) as f32);
+            Point3::new(x, y, if i < 25 { 1.2 } else { 0.0 } + 0.02 * x * y)
+        };
+        let start: Vec<Point3<f32>> = (0..50).map(at).collect();
+        let tiles = Tiles::new(&parts, &start);
+        let [a, b] = [&tiles.tiles[0], &tiles.tiles[1]];
+        let mut kept = 0;
+        for _ in 0..200 {
+            let mut pair = TilePair::new([0, 1]);
+            let (mut reference, mut now) = (start.clone(), start.clone());
+            let normals = [(a, 0), (b, 1)].map(|(t, p)| t.normal(&parts[p], &now, |_| {}));
+            let (normal, gap) = slab([a, b], [&now, &now], normals, 9.0);
+            pair.keep_slab(normal, gap, &Way::default());
+            let mut step = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0_f32));
+            let (common, turn) = (step() * 0.5, step() * 0.01);
+            let slide = Vector3::new(0.2, 0.1, 0.0) * step().x;
+            for k in 0..12 {
+                for (i, p) in now.iter_mut().enumerate() {
+                    let own = if i < 25 { slide } else { -slide };
+                    *p += common + turn.cross(&p.coords) + own + step() * 0.02;
+                }
+                let ways = [a, b].map(|t| Way::of(&t.ways(&reference, &now)));
+                let way = ways[0].against(&ways[1]);
+                let promised = pair.clearance(&way);
+                let least = |n: u32| {
+                    let others = b.hull.iter();
+                    others
+                        .map(|&m| (now[n as usize] - now[m as usize]).norm())
+                        .fold(f32::MAX, f32::min)
+                };
+                let there_is = a.hull.iter().map(|&n| least(n)).fold(f32::MAX, f32::min);
+                assert!(promised <= there_is, "{promised} of {there_is} mm");
+                kept += usize::from(promised > 0.0);
+                if k % 5 == 4 {
+                    pair.renew(&way);
+                    reference.copy_from_slice(&now);
+                }
+            }
+        }
+        assert!(kept > 800, "they last: {kept} of 2,400");
+    }
+
+    #[test]
+    fn a_sheet_that_is_bent_double_or_has_no_area_is_not_flat() {
+        let flat = [Vector3::z() * 2.0, Vector3::new(0.1, 0.0, 1.0)];
+        assert!(flat_way(&flat) > 1.0);
+        assert_eq!(flat_way(&[Vector3::z(), Vector3::x() * 3.0]), 0.0);
+        assert_eq!(flat_way(&[Vector3::z(), -Vector3::z()]), 0.0);
+        assert_eq!(flat_way(&[Vector3::z(), Vector3::zeros()]), 0.0);
+    }
 }

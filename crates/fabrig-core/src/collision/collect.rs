@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::certificate::{Candidate, FLAT_WAY, TilePair, are_flat, slab};
+use super::certificate::{Candidate, TilePair, flat_way, slab};
 use super::contact::Contact;
 use super::detect::{GUARD_THICKNESS, MARGIN, PairList};
 use super::distance::{PairKind, closest_weights, weighted, wide};
@@ -13,7 +13,7 @@ use super::tile::{Extent, Way, least, most};
 use crate::Vector;
 
 /// Candidates are listed up to this beyond their thickness. (mm)
-const LIST_REACH: f64 = 0.8;
+const LIST_REACH: f64 = 0.5;
 /// A slab this much wider than the thickness needs no wider one. (mm)
 const WIDE_ENOUGH: f32 = 1.0;
 /// Share of the distance at rest that is kept, where that is less than the thickness.
@@ -36,20 +36,21 @@ impl Contact {
         self.actives.clear();
         let mut lists = std::mem::take(&mut self.lists);
         for list in &mut lists {
+            let gone = self.watch.gone[list.a] + self.watch.gone[list.b];
+            if list.collider.is_none() && gone - list.gone < list.left {
+                continue;
+            }
             let mut pairs = std::mem::take(&mut list.pairs);
+            let mut left = f32::INFINITY;
             for pair in &mut pairs {
-                if pair.is_clear(&self.watch.way_of(pair), 0.0)
-                    || pair.tiles.iter().all(|&t| self.is_pushed[t as usize])
-                {
-                    continue;
-                }
-                if self.may_touch(list, pair) {
-                    for t in pair.tiles {
-                        self.push_around(t);
-                    }
+                let clearance = pair.clearance(&self.watch.way_of(pair));
+                left = least(left, clearance);
+                if clearance <= 0.0 && !pair.tiles.iter().all(|&t| self.is_pushed[t as usize]) {
+                    self.find_touching(list, pair);
                 }
             }
             list.pairs = pairs;
+            (list.left, list.gone) = (f64::from(left), gone);
         }
         self.lists = lists;
         self.collect_pushed();
@@ -65,10 +66,14 @@ impl Contact {
         let mut lists = std::mem::take(&mut self.lists);
         let mut actives = std::mem::take(&mut self.actives);
         for (index, list) in lists.iter_mut().enumerate() {
+            let watch = &self.watch;
+            if !watch.is_pushed[list.a] && !watch.is_pushed[list.b] {
+                continue;
+            }
             let mut pairs = std::mem::take(&mut list.pairs);
             for pair in &mut pairs {
                 if !pair.tiles.iter().any(|&t| self.is_pushed[t as usize])
-                    || pair.is_clear(&self.watch.way_of(pair), more as f32)
+                    || pair.clearance(&self.watch.way_of(pair)) > more as f32
                     || !self.has_list(list, pair, more as f32)
                 {
                     continue;
@@ -100,19 +105,10 @@ impl Contact {
         self.lists = lists;
     }
 
-    /// Marks a tile and those that share nodes with it.
-    fn push_around(&mut self, tile: u32) {
-        self.is_any_pushed = true;
-        for &node in &self.tiles.tiles[tile as usize].hull {
-            for &t in self.tiles.of_node(node) {
-                self.is_pushed[t as usize] = true;
-            }
-        }
-    }
-
     /// Marks the tiles of a node. Returns whether one was not yet.
     pub(super) fn push_node(&mut self, node: u32) -> bool {
         self.is_any_pushed = true;
+        self.watch.is_pushed[self.part_of[node as usize] as usize] = true;
         let mut any = false;
         for &t in self.tiles.of_node(node) {
             any |= !std::mem::replace(&mut self.is_pushed[t as usize], true);
@@ -120,28 +116,31 @@ impl Contact {
         any
     }
 
-    /// Whether any elements of a pair that has no certificate may come nearer than their
-    /// thickness.
-    fn may_touch(&mut self, list: &PairList, pair: &mut TilePair) -> bool {
+    /// Marks the tiles of elements that may come nearer than their thickness, of a pair that has
+    /// no certificate.
+    fn find_touching(&mut self, list: &PairList, pair: &mut TilePair) {
         if !self.has_list(list, pair, 0.0) {
-            return false;
+            return;
         }
         let (since, known) = self.since_and_known(pair);
         let mut looked_at = 0;
-        for c in &mut pair.candidates {
+        let mut candidates = std::mem::take(&mut pair.candidates);
+        for c in &mut candidates {
             if c.gap - since > 0.0 {
                 continue;
             }
             looked_at += 1;
             if self.may_close(c, 0.0, known).is_some() {
-                return true;
+                for node in c.nodes {
+                    self.push_node(node);
+                }
             }
         }
+        pair.candidates = candidates;
         if looked_at > MOST_LOOKED_AT && since > FAR_GONE {
             // From where the tiles are now, fewer may close.
             self.list_candidates(list, pair);
         }
-        false
     }
 
     /// Whether elements of a pair have to be looked at one by one, with allowance for `more`
@@ -172,10 +171,9 @@ impl Contact {
                 .are_adjacent(&self.parts[list.a], pair.tiles[0], pair.tiles[1])
         {
             // What they go in this pass counts from where they are, too.
-            if self.way_of_pass(pair) + more < FLAT_WAY
-                && normals.get(..count).is_some_and(are_flat)
-            {
-                pair.keep_length(FLAT_WAY, &self.watch.way_until_now(pair));
+            let way = normals.get(..count).map_or(0.0, flat_way);
+            if way > 0.0 && self.way_of_pass(pair) + more < way {
+                pair.keep_length(way, &self.watch.way_until_now(pair));
                 return false;
             }
         } else {

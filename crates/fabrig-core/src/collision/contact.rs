@@ -312,6 +312,10 @@ impl Contact {
         }
         self.is_touched.fill(false);
         for pass in 0..passes {
+            if passes > 1 {
+                // What parts go is measured for the substep, not for each pass.
+                self.lists.iter_mut().for_each(|list| list.left = -1.0);
+            }
             let left = (passes - pass) as f64;
             let share = 1.0 / left;
             if passes == 1 {
@@ -337,7 +341,16 @@ impl Contact {
 
     /// The longest way of anything in a substep (mm); marks the colliders that are away.
     fn longest_way(&mut self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
-        let mut furthest = longest(goal, &self.positions[..self.cloth_count]);
+        let mut furthest = 0.0_f64;
+        for (part, gone) in self.parts[..self.cloth_parts]
+            .iter()
+            .zip(&mut self.watch.gone)
+        {
+            let range = part.first as usize..(part.first + part.count) as usize;
+            let way = longest(&goal[range.clone()], &self.positions[range]);
+            *gone += way;
+            furthest = furthest.max(way);
+        }
         for index in 0..self.world.len() {
             let c = &self.world[index];
             // The face's own bodies are always there.

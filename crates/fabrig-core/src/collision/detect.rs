@@ -13,14 +13,14 @@ use super::contact::Contact;
 use super::tile::{Extent, Way, least, most};
 
 /// How far projection may move nodes before candidates are collected again. (mm)
-pub(super) const MARGIN: f64 = 0.04;
+pub(super) const MARGIN: f64 = 0.02;
 /// Room that every tile has around where it is and where it is going. (mm)
 const ROOM: f32 = 0.5;
 /// Passes for which the room of a tile is foreseen, and the furthest that it goes then (mm).
 const FORESEEN: (f32, f32) = (12.0, 3.0);
 /// Certificates found for the second time since parts were looked at, after which they are
 /// looked at anew.
-const MOST_REPEATED: usize = 1500;
+const MOST_REPEATED: usize = 600;
 /// What is kept from the mesh inside a round collider, which only stops cells that are
 /// stretched across it: nodes are held out by its round surface. (mm)
 pub(super) const GUARD_THICKNESS: f64 = 0.05;
@@ -35,6 +35,11 @@ pub(crate) struct PairList {
     pub(crate) collider: Option<usize>,
     /// Rising.
     pub(crate) pairs: Vec<TilePair>,
+    /// How far its parts may go, both together, before one of its pairs has to be looked at:
+    /// less than zero, if one has. (mm)
+    pub(super) left: f64,
+    /// How far they had gone when that was found. (mm)
+    pub(super) gone: f64,
 }
 
 impl PairList {
@@ -45,6 +50,8 @@ impl PairList {
             friction,
             collider,
             pairs: Vec::new(),
+            left: -1.0,
+            gone: 0.0,
         }
     }
 }
@@ -62,6 +69,10 @@ pub(super) struct Watch {
     /// Boxes that tiles stay in, and parts. (mm)
     boxes: Vec<Extent>,
     part_boxes: Vec<Extent>,
+    /// How far nodes of each part have gone, at most, pass after pass. (mm)
+    pub(super) gone: Vec<f64>,
+    /// Parts in which something is pushed in this pass.
+    pub(super) is_pushed: Vec<bool>,
     /// Whether parts are to be looked at, whatever they do.
     pub(super) is_stale: bool,
     /// How often parts were looked at, and certificates that were found again since.
@@ -94,6 +105,8 @@ impl Watch {
             rooms: vec![Extent::EMPTY; tile_count],
             boxes: vec![Extent::EMPTY; tile_count],
             part_boxes: vec![Extent::EMPTY; part_count],
+            gone: vec![0.0; part_count],
+            is_pushed: vec![false; part_count],
             is_stale: true,
             ..Self::default()
         }
@@ -149,6 +162,11 @@ impl Contact {
         std::mem::swap(&mut watch.now, &mut watch.next);
         if !self.is_any_pushed {
             return;
+        }
+        for list in &mut self.lists {
+            if watch.is_pushed[list.a] || watch.is_pushed[list.b] {
+                list.left = -1.0;
+            }
         }
         for (t, _) in self.is_pushed.iter().enumerate().filter(|(_, p)| **p) {
             watch.now[t] = self.tiles.tiles[t].ways(&self.reference, &self.positions);
@@ -224,6 +242,7 @@ impl Contact {
             if !self.is_away(list.b) {
                 self.near_tiles(list, &mut near);
             }
+            list.left = -1.0;
             merge(&mut list.pairs, &near);
         }
         self.lists = lists;

@@ -18,8 +18,6 @@ use crate::Vector;
 
 /// Rounds in which ways are halved, before nodes are held.
 const HALVINGS: usize = 6;
-/// Rounds at most.
-const ROUNDS: usize = 200;
 /// Share of its distance that a pair keeps in a pass.
 const KEPT: f64 = 0.1;
 /// Pairs nearer than this come no nearer: stored positions are not finer. (mm)
@@ -35,6 +33,7 @@ impl Contact {
         }
         if std::mem::take(&mut self.is_any_pushed) {
             self.is_pushed.fill(false);
+            self.watch.is_pushed.fill(false);
         }
         self.refresh_pairs();
         self.collect_smooth();
@@ -83,7 +82,7 @@ impl Contact {
 
     fn make_safe(&mut self, mut went_far: bool) {
         let mut halved = 0;
-        for round in 0..ROUNDS {
+        loop {
             if went_far {
                 // What was pushed may now meet what was not looked at.
                 let pushes: Vec<Active> = self
@@ -97,22 +96,20 @@ impl Contact {
                 self.remember(&pushes);
                 went_far = false;
             }
-            let mut is_safe = true;
+            let mut unsafe_count = 0;
+            let mut has_changed = false;
             let actives = std::mem::take(&mut self.actives);
             for a in &actives {
                 if self.is_safe(a) {
                     continue;
                 }
-                is_safe = false;
+                unsafe_count += 1;
                 if let Some(c) = self.carrier(a) {
                     if self.carry(a, c) {
                         went_far = true;
                         continue;
                     }
                     if self.lists[a.list as usize].collider.is_some() {
-                        if round + 1 == ROUNDS {
-                            self.report.pinched += 1;
-                        }
                         continue;
                     }
                 }
@@ -122,24 +119,31 @@ impl Contact {
                     if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
                         continue;
                     }
-                    self.altered.push(n);
-                    self.push_node(n);
                     let from = wide(&self.positions[i]);
                     let way = wide(&self.wanted[i]) - from;
-                    self.wanted[i] = if halved < HALVINGS {
+                    let held = if halved < HALVINGS {
                         narrow(&(from + way * 0.5))
                     } else {
                         self.positions[i]
                     };
+                    if self.wanted[i] != held {
+                        self.wanted[i] = held;
+                        self.altered.push(n);
+                        self.push_node(n);
+                        has_changed = true;
+                    }
                 }
             }
             self.actives = actives;
             halved += 1;
             if self.carry_out_of_round() {
-                is_safe = false;
                 went_far = true;
+            } else if unsafe_count == 0 {
+                return;
             }
-            if is_safe {
+            if !has_changed && !went_far {
+                // All their nodes are held or carried: caught between colliders.
+                self.report.pinched += unsafe_count;
                 return;
             }
         }

@@ -267,7 +267,8 @@ fn nothing_crosses_in_random_scenes() {
     // Many are for a night; a few tell of a mistake.
     let asked = std::env::var("FABRIG_CONTACT_SCENES").ok();
     let count: u64 = asked.and_then(|text| text.parse().ok()).unwrap_or(8);
-    for seed in 0..count {
+    // In scene 53 hundreds of nodes are carried along.
+    for seed in (0..count).chain((count <= 53).then_some(53)) {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let heights = [2.0, 0.7, -0.7];
         let sheets = heights

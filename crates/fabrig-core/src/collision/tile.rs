@@ -372,3 +372,43 @@ fn mesh_groups(part: &Part, rest: &[Point3<f32>]) -> Vec<([u32; 2], Vec<u32>)> {
     let groups = Tree::of_centers(&centers).clusters(MESH_CELLS);
     (0..).map(|k| [k, 0]).zip(groups).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::GridShape;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn rows_are_measured_as_nodes_are_one_by_one() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        for (u_count, v_count, is_periodic) in [(21, 20, false), (48, 15, true), (7, 3, true)] {
+            let shape = GridShape {
+                u_count,
+                v_count,
+                is_periodic,
+            };
+            let part = Part::of_grid(shape, 0);
+            let mut places = || -> Vec<Point3<f32>> {
+                let mut at = || random.random_range(-9.0..9.0_f32);
+                (0..part.count)
+                    .map(|_| Point3::new(at(), at(), at()))
+                    .collect()
+            };
+            let (from, to) = (places(), places());
+            let tiles = Tiles::new(std::slice::from_ref(&part), &from);
+            let mut out = vec![Extent::EMPTY; tiles.len()];
+            let mut rows = [Vec::new(), Vec::new()];
+            tiles.measure(0, &part, [&from, &to], &mut out, &mut rows);
+            let mut owned = 0;
+            for (tile, extent) in tiles.tiles.iter().zip(&out) {
+                let ways = tile.ways(&from, &to);
+                // A ring that is no multiple of a tile may take a column more.
+                assert!(extent.holds(&ways), "{shape:?}");
+                assert!(u_count == 7 || *extent == ways, "{shape:?}");
+                owned += tile.own.len();
+            }
+            assert_eq!(owned, part.count as usize, "every node has one owner");
+        }
+    }
+}
