@@ -97,7 +97,6 @@ impl Contact {
                 went_far = false;
             }
             let mut unsafe_count = 0;
-            let mut has_changed = false;
             let actives = std::mem::take(&mut self.actives);
             for a in &actives {
                 if self.is_safe(a) {
@@ -130,7 +129,8 @@ impl Contact {
                         self.wanted[i] = held;
                         self.altered.push(n);
                         self.push_node(n);
-                        has_changed = true;
+                        // What went the same way as it may now run into it.
+                        went_far = true;
                     }
                 }
             }
@@ -141,7 +141,7 @@ impl Contact {
             } else if unsafe_count == 0 {
                 return;
             }
-            if !has_changed && !went_far {
+            if !went_far {
                 // All their nodes are held or carried: caught between colliders.
                 self.report.pinched += unsafe_count;
                 return;
