@@ -256,6 +256,9 @@ fn shape_weights(name: &str, template: &Template) -> PyResult<Vec<f32>> {
 /// - `fps`: frames a second; the scene's or else the take's own by default
 /// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
 /// - `substeps`: of the cloth, per 1/60 s
+/// - `economy`: by how much frames may differ from the full model, as the root mean square over
+///   any patch (mm), or "0.05 %" of the face's height; "off" models everything. What was left out is in
+///   the report's "economy"
 /// - `dynamics`: False leaves patches where the muscle shapes want them
 /// - `record`: all that is to be in the recording, of "skin", "patches", "points", "magnets",
 ///   "strain", "contacts", "colliders", "weights", "energies", "errors" and "timings"; by default
@@ -271,7 +274,7 @@ fn shape_weights(name: &str, template: &Template) -> PyResult<Vec<f32>> {
 /// 4
 #[pyfunction]
 #[pyo3(signature = (rig, clip, output, *, scene=None, fps=None, gravity=None, wind=None, substeps=None,
-                    dynamics=true, record=None, skin_hz=None, patches_hz=None, points_hz=None, strain_hz=None,
+                    economy=None, dynamics=true, record=None, skin_hz=None, patches_hz=None, points_hz=None, strain_hz=None,
                     rig_name=None, take_name=None, layout=None, progress=None))]
 #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
 pub(crate) fn animate<'py>(
@@ -284,6 +287,7 @@ pub(crate) fn animate<'py>(
     gravity: Option<&Bound<'py, PyAny>>,
     wind: Option<&Bound<'py, PyAny>>,
     substeps: Option<u32>,
+    economy: Option<&Bound<'py, PyAny>>,
     dynamics: bool,
     record: Option<Vec<String>>,
     skin_hz: Option<f64>,
@@ -296,7 +300,7 @@ pub(crate) fn animate<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     check_rate(fps)?;
-    let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
+    let scene = self::scene(scene, gravity, wind, substeps, economy, dynamics)?;
     let mut options = AnimateOptions {
         fps,
         ..AnimateOptions::default()
@@ -384,7 +388,7 @@ pub(crate) fn animate_scene<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
     check_rate(fps)?;
-    let scene = self::scene(Some(scene), None, None, None, true)?;
+    let scene = self::scene(Some(scene), None, None, None, None, true)?;
     if scene.faces.is_empty() {
         return Err(input(
             "scene: it has no `faces`; `animate` takes a rig and a clip",

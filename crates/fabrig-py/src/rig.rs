@@ -158,7 +158,7 @@ impl PyRig {
             fps,
             shapes: shape_source(shapes)?,
             check_sum: check,
-            scene: self::scene(scene.as_ref(), None, None, None, true)?,
+            scene: self::scene(scene.as_ref(), None, None, None, None, true)?,
             ..layout.options()?
         };
         crate::export::export(py, self, path, motion, options, progress)
@@ -240,7 +240,7 @@ impl PyRig {
             None => vec![0.0; shapes.len()],
         };
         let shot = Shot::new(view, size, edges)?.framed(zoom)?;
-        let scene = scene(None, None, None, None, dynamics)?;
+        let scene = scene(None, None, None, None, None, dynamics)?;
         draw_rig(
             py,
             &self.inner,

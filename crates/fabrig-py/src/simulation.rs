@@ -7,7 +7,7 @@ use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::motion::{EyeAngles, ReadOptions};
 use fabrig_core::pipeline::{StagedFace, load_faces};
 use fabrig_core::scene::fields::HeadDrive;
-use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation, hold_pose};
+use fabrig_core::scene::{Dynamics, FacePose, Scene, SceneError, Simulation, Tolerance, hold_pose};
 use fabrig_core::template;
 use nalgebra::{Isometry3, Vector3};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -38,6 +38,7 @@ pub(crate) fn scene(
     gravity: Option<&Bound<'_, PyAny>>,
     wind: Option<&Bound<'_, PyAny>>,
     substeps: Option<u32>,
+    economy: Option<&Bound<'_, PyAny>>,
     dynamics: bool,
 ) -> PyResult<Scene> {
     let mut scene = match fields {
@@ -55,6 +56,18 @@ pub(crate) fn scene(
     }
     if let Some(substeps) = substeps {
         scene.cloth.substeps = substeps;
+    }
+    if let Some(tolerance) = economy {
+        scene.economy.tolerance = match tolerance.extract::<f64>() {
+            Ok(mm) => Tolerance::Millimetres(mm),
+            Err(_) => tolerance
+                .extract::<String>()
+                .map_err(|_| {
+                    input("economy: expected millimetres, or a text such as '0.05 %' or 'off'")
+                })?
+                .parse()
+                .map_err(|e: SceneError| input(format!("economy: {e}")))?,
+        };
     }
     if !dynamics {
         scene.dynamics = Dynamics::None;
@@ -114,6 +127,8 @@ pub(crate) fn demo_scene(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
 /// - `face`: name of one of those faces, where there are several
 /// - `gravity`, `wind`: shape (3,), world axes, +Y up (mm/s^2, mm/s)
 /// - `substeps`: of the cloth, per 1/60 s
+/// - `economy`: by how much frames may differ from the full model, as the root mean square over
+///   any patch (mm), or "0.05 %" of the face's height; "off" models everything
 /// - `dynamics`: False leaves patches where the muscle shapes want them
 ///
 /// >>> simulation = fabrig.Simulation(fabrig.rig(fabrig.demo_face()))
@@ -131,7 +146,7 @@ pub(crate) struct PySimulation {
 impl PySimulation {
     #[new]
     #[pyo3(signature = (rig=None, clip=None, *, scene=None, face=None, gravity=None, wind=None,
-                        substeps=None, dynamics=true))]
+                        substeps=None, economy=None, dynamics=true))]
     #[allow(clippy::too_many_arguments)] // Keyword-only in Python.
     fn new(
         py: Python<'_>,
@@ -142,9 +157,10 @@ impl PySimulation {
         gravity: Option<&Bound<'_, PyAny>>,
         wind: Option<&Bound<'_, PyAny>>,
         substeps: Option<u32>,
+        economy: Option<&Bound<'_, PyAny>>,
         dynamics: bool,
     ) -> PyResult<Self> {
-        let scene = self::scene(scene, gravity, wind, substeps, dynamics)?;
+        let scene = self::scene(scene, gravity, wind, substeps, economy, dynamics)?;
         let Some(rig) = rig else {
             if clip.is_some() {
                 return Err(input(

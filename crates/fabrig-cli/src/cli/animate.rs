@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use fabrig_core::recording::{RecordedKind, RecordingOptions};
-use fabrig_core::scene::RecordingChoice;
+use fabrig_core::scene::{RecordingChoice, Tolerance};
 
 use super::TakeArgs;
 
@@ -16,6 +16,11 @@ pub(crate) struct SceneArgs {
     /// Substeps of the cloth per 1/60 s [default: the solver's]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) substeps: Option<u32>,
+    /// By how much frames may differ from the full model, as the root mean square over any patch:
+    /// millimetres, or percent of the face's height such as 0.05%; off models everything [default:
+    /// the scene's, or else 0.1]
+    #[arg(long, value_name = "MM|%|off")]
+    pub(crate) economy: Option<Tolerance>,
     /// Gravity in mm/s^2, world axes, +Y up [default: 0,-9810,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     pub(crate) gravity: Option<[f32; 3]>,

@@ -20,6 +20,9 @@ pub(crate) enum BenchCommand {
     /// How well faces of known truth are registered, or with `--cost` how long faces of growing
     /// size take to rig
     Registration(BenchRegistrationArgs),
+    /// The economical run beside the full one, on takes and random scenes: what is left out, what
+    /// it costs, and whether any bound is violated
+    Economy(BenchEconomyArgs),
     /// The cloth solver's time beside its error: modes, substeps, sweeps, stiffness ratios
     Pareto(BenchParetoArgs),
     /// Faces times takes with one worker and with two: time, throughput, equal bytes
@@ -77,6 +80,25 @@ pub(crate) struct BenchTable3Args {
     /// Also write one page with pictures: every pose of every face, coloured by its error
     #[arg(long, value_name = "OUT.html")]
     pub(crate) html: Option<PathBuf>,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchEconomyArgs {
+    /// Random scenes
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(crate) scenes: u64,
+    /// Seed of the first of them
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 40))]
+    pub(crate) seed: u64,
+    /// A take to measure beside the bundled ones
+    #[arg(long, value_name = "FILE")]
+    pub(crate) motion: Option<PathBuf>,
+    /// Frames of a take, at most
+    #[arg(long, value_name = "N", default_value_t = 720)]
+    pub(crate) frames: usize,
     /// Print as JSON
     #[arg(long)]
     pub(crate) json: bool,

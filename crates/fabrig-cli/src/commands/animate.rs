@@ -9,8 +9,8 @@ use fabrig_core::collision::{PairMask, Stickiness, read_colliders};
 use fabrig_core::edit::{apply_preset, edits_path, load_edited_rig};
 use fabrig_core::motion::{self, Adjustment, Clip, ClipNotes, ReadOptions};
 use fabrig_core::pipeline::{
-    AnimateOptions, AnimateProgress, AnimateReport, ContactSummary, TimeStatistics, animate,
-    animate_scene, load_faces,
+    AnimateOptions, AnimateProgress, AnimateReport, ContactSummary, EconomySummary, TimeStatistics,
+    animate, animate_scene, load_faces,
 };
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{Dynamics, Scene, SceneError};
@@ -237,6 +237,9 @@ pub(super) fn scene(args: &SceneArgs) -> Result<Scene> {
     if args.without_dynamics {
         scene.dynamics = Dynamics::None;
     }
+    if let Some(tolerance) = args.economy {
+        scene.economy.tolerance = tolerance;
+    }
     if let Some(substeps) = args.substeps {
         scene.cloth.substeps = substeps;
     }
@@ -308,6 +311,63 @@ fn print_face(console: &Console, report: &AnimateReport) {
     if let Some(contact) = &report.contact {
         print_contact(&line, contact);
     }
+    print_economy(&line, &report.economy);
+}
+
+/// What was modelled and what was not, with what that may cost and what it saved.
+fn print_economy(line: &impl Fn(&str, String), economy: &EconomySummary) {
+    if economy.tolerance == 0.0 {
+        line("economy", "none: everything was modelled".to_owned());
+        return;
+    }
+    let modelled = |spared: f64| {
+        format!(
+            "{:>6.1} %   {:>6.1} %",
+            100.0 - 100.0 * spared,
+            100.0 * spared
+        )
+    };
+    line("economy", "modelled    skipped".to_owned());
+    line(
+        "  cloth",
+        format!(
+            "{}  of {} patches in {} frames",
+            modelled(economy.slept),
+            economy.patches,
+            economy.frames
+        ),
+    );
+    line("  substeps", modelled(economy.substeps_spared));
+    line("  muscle shapes", modelled(economy.not_evaluated));
+    line("  skin", modelled(economy.skin_left));
+    line(
+        "  bound",
+        format!(
+            "{:.3} mm rms of any patch against the full model ({:.3} tolerated), {:.2} where one snaps \
+             into another fold",
+            economy.estimate, economy.tolerance, economy.bound
+        ),
+    );
+    if economy.storm_frames > 0 {
+        line(
+            "  storm",
+            format!(
+                "{} frames modelled whole, as patches buckle in them",
+                economy.storm_frames
+            ),
+        );
+    }
+    line(
+        "  time saved",
+        match economy.time_saved {
+            Some(share) => format!(
+                "{:.0} % of simulating, by {} frames that were modelled whole",
+                100.0 * share,
+                economy.whole_frames
+            ),
+            None => "not known: too few frames were modelled whole".to_owned(),
+        },
+    );
 }
 
 /// What of a report is of the recording, whose faces share it.

@@ -49,7 +49,8 @@ pub(super) fn assemble(patches: &[ClothPatch], options: &ClothOptions) -> Assemb
     }
 }
 
-/// Patches of one shape, with or without pressure, in chunks that fit into lanes.
+/// Patches of one shape, with or without pressure, in chunks that fit into lanes; from the top
+/// down, so that what moves together sleeps together.
 fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> {
     let widest = match precision {
         Precision::Single => F32x8::LANES,
@@ -66,9 +67,14 @@ fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> 
         );
         alike.entry(key).or_default().push(index);
     }
+    let height = |&patch: &usize| -> f64 {
+        let rest = &patches[patch].rest;
+        rest.iter().map(|p| f64::from(p.y)).sum::<f64>() / rest.len().max(1) as f64
+    };
     alike
         .into_values()
-        .flat_map(|members| {
+        .flat_map(|mut members| {
+            members.sort_by(|a, b| height(b).total_cmp(&height(a)));
             members
                 .chunks(widest)
                 .map(<[usize]>::to_vec)

@@ -51,7 +51,15 @@ impl Guard {
         self.troubled_frames.fill(0);
     }
 
-    /// Looks at every patch after a frame, and acts where one has gone wrong.
+    /// Says that patches fell asleep or woke: what was put into the whole is no longer known.
+    pub(super) fn forget_whole(&mut self) {
+        if let Some(whole) = self.ceilings.last_mut() {
+            *whole = f64::INFINITY;
+        }
+    }
+
+    /// Looks at every patch after a frame, and acts where one has gone wrong. Patches of groups
+    /// that sleep keep what they had.
     ///
     /// - `dt`: duration of the frame (s)
     pub(super) fn watch(
@@ -59,6 +67,7 @@ impl Guard {
         dt: f64,
         groups: &mut [Box<dyn PatchGroup>],
         monitors: &[Vec<Monitor>],
+        asleep: &[bool],
     ) -> (Counters, Energies) {
         let mut counters = Counters::default();
         let mut sum = Energies::default();
@@ -68,7 +77,8 @@ impl Guard {
             ..Monitor::default()
         };
         let mut whole_energy = 0.0;
-        for m in monitors.iter().flatten() {
+        let awake = monitors.iter().zip(asleep).filter(|(_, asleep)| !**asleep);
+        for m in awake.flat_map(|(monitors, _)| monitors) {
             whole.before += m.before;
             whole.drive += m.drive;
             whole.mismatch += m.mismatch;
@@ -77,7 +87,13 @@ impl Guard {
         }
         let last = self.ceilings.len() - 1;
         let whole_bound = energy_bound(&whole, dt, whole_energy, &mut self.ceilings[last]);
-        for (group, monitors) in groups.iter_mut().zip(monitors) {
+        for ((group, monitors), &is_asleep) in groups.iter_mut().zip(monitors).zip(asleep) {
+            if is_asleep {
+                for &patch in group.patches() {
+                    sum += self.energies[patch];
+                }
+                continue;
+            }
             for (lane, m) in monitors.iter().enumerate() {
                 let patch = group.patches()[lane];
                 counters.clamped_displacements += m.clamped;

@@ -211,6 +211,12 @@ pub struct FrameInput<'a> {
     pub wind: Vector3<f32>,
     /// Motion of the head frame.
     pub head: HeadMotion,
+    /// Substeps per 1/60 s of this frame alone; none: [`ClothOptions::substeps`].
+    pub substeps: Option<u32>,
+    /// One per patch, or none at all: patches that may keep their displacement from their targets
+    /// through this frame. Where all that share a register may, they sleep: no substep is taken,
+    /// and where no target moves nothing is done at all. Without effect where a hook moves nodes.
+    pub held: &'a [bool],
 }
 
 impl<'a> FrameInput<'a> {
@@ -223,6 +229,8 @@ impl<'a> FrameInput<'a> {
             gravity: None,
             wind: Vector3::zeros(),
             head: HeadMotion::default(),
+            substeps: None,
+            held: &[],
         }
     }
 }

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct StepReport {
     /// Substeps taken.
     pub substeps: u32,
+    /// Patches that slept.
+    #[serde(default)]
+    pub sleeping_patches: u32,
     /// Guards that acted in this frame.
     pub counters: Counters,
     /// Energies at the end of the frame, over all patches.

@@ -27,11 +27,26 @@ pub struct Cloth {
     /// Ports of each group, and those of the next substep.
     ports: [Vec<Ports>; 2],
     has_pairs: bool,
+    /// Groups that sleep.
+    asleep: Vec<bool>,
+    /// What patches do that sleep, one per patch.
+    dreams: Vec<Dream>,
+    /// Motions of targets and anchors that sleeping patches last followed.
+    dreamt: [Vec<PatchMotion>; 2],
     monitors: Vec<Vec<Monitor>>,
     guard: Guard,
     positions: Vec<Vec<Point3<f32>>>,
     previous_h: f64,
     fields: Fields,
+}
+
+/// What a patch does that sleeps: it keeps its displacement from its targets.
+#[derive(Debug, Clone, Default)]
+struct Dream {
+    /// (mm)
+    displacements: Vec<Vector3<f32>>,
+    /// Whether it fell asleep just now.
+    is_new: bool,
 }
 
 /// Gravity's difference, wind and head motion at the end of a frame.
@@ -101,6 +116,9 @@ impl Cloth {
             positions: patches.iter().map(|p| p.rest.clone()).collect(),
             guard: Guard::new(patches.len(), has_pairs),
             monitors: vec![Vec::new(); groups.len()],
+            asleep: vec![false; groups.len()],
+            dreams: vec![Dream::default(); patches.len()],
+            dreamt: [(); 2].map(|()| vec![PatchMotion::default(); patches.len()]),
             ports: [empty_ports.clone(), empty_ports],
             has_pairs,
             layout,
@@ -170,6 +188,7 @@ impl Cloth {
         for group in &mut self.groups {
             group.reset(targets, anchors);
         }
+        self.asleep.fill(false);
         self.fields = Fields::NONE;
         self.previous_h = 0.0;
         self.guard.reset();
@@ -208,12 +227,14 @@ impl Cloth {
     ) -> Result<StepReport, ClothError> {
         validate::frame(&self.layout, input)?;
         let end = Fields::of(input, self.options.standing_gravity);
-        let count = self.substep_count(input.dt);
+        let count = self.substep_count(input.dt, input.substeps);
+        self.send_to_sleep(if hook.is_some() { &[] } else { input.held }, input.dt);
+        self.dream(input);
         let substeps: Vec<Substep> = (0..count)
             .map(|k| self.substep(k, count, input.dt, &end))
             .collect();
         let (dt, targets, anchors) = (input.dt, input.targets, input.anchors);
-        let monitors = &mut self.monitors;
+        let (monitors, asleep) = (&mut self.monitors, &self.asleep);
         if let Some(hook) = hook {
             self.groups
                 .par_iter_mut()
@@ -230,19 +251,21 @@ impl Cloth {
                 .zip(monitors)
                 .for_each(|(g, m)| g.end_frame(m));
         } else if self.has_pairs {
-            self.groups
-                .par_iter_mut()
-                .for_each(|g| g.begin_frame(dt, targets, anchors));
-            advance_together(&mut self.groups, &mut self.ports, &substeps);
+            awake(&mut self.groups, asleep).for_each(|g| g.begin_frame(dt, targets, anchors));
+            advance_together(&mut self.groups, &mut self.ports, &substeps, asleep);
             self.groups
                 .par_iter_mut()
                 .zip(monitors)
-                .for_each(|(g, m)| g.end_frame(m));
+                .zip(asleep)
+                .filter(|(_, asleep)| !**asleep)
+                .for_each(|((g, m), _)| g.end_frame(m));
         } else {
             self.groups
                 .par_iter_mut()
                 .zip(monitors)
-                .for_each(|(group, monitor)| {
+                .zip(asleep)
+                .filter(|(_, asleep)| !**asleep)
+                .for_each(|((group, monitor), _)| {
                     group.begin_frame(dt, targets, anchors);
                     let mut none = Ports::default();
                     for (k, substep) in substeps.iter().enumerate() {
@@ -259,10 +282,18 @@ impl Cloth {
         }
         self.fields = end;
         self.previous_h = input.dt / f64::from(count);
-        let (counters, energies) = self.guard.watch(input.dt, &mut self.groups, &self.monitors);
+        let (counters, energies) =
+            self.guard
+                .watch(input.dt, &mut self.groups, &self.monitors, &self.asleep);
         self.write_positions();
+        let sleepers = self.groups.iter().zip(&self.asleep).filter(|(_, a)| **a);
         Ok(StepReport {
-            substeps: count,
+            substeps: if self.asleep.iter().all(|a| *a) {
+                0
+            } else {
+                count
+            },
+            sleeping_patches: sleepers.map(|(g, _)| g.patches().len() as u32).sum(),
             counters,
             energies,
         })
@@ -275,6 +306,15 @@ impl Cloth {
     /// If there is no such patch.
     pub fn positions(&self, patch: usize) -> &[Point3<f32>] {
         &self.positions[patch]
+    }
+
+    /// Whether a patch slept in the last step.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such patch.
+    pub fn is_asleep(&self, patch: usize) -> bool {
+        self.asleep[self.layout[patch].group]
     }
 
     /// Energies of a patch after the last step.
@@ -293,13 +333,95 @@ impl Cloth {
     /// If there is no such patch or node.
     pub fn node_state(&self, patch: usize, node: usize) -> (Point3<f64>, Vector3<f64>) {
         let at = &self.layout[patch];
+        if self.asleep[at.group] {
+            let (target, u) = (&self.dreamt[0][patch], &self.dreams[patch].displacements);
+            let x = target.positions[node].cast() + u[node].cast::<f64>();
+            let v = target.velocities.get(node);
+            return (x, v.map_or(Vector3::zeros(), |v| v.cast()));
+        }
         let (x, v) = self.groups[at.group].node_state(at.lane, node);
         (Point3::from(x), Vector3::from(v))
     }
 
-    fn substep_count(&self, dt: f64) -> u32 {
-        let wanted = dt * 60.0 * f64::from(self.options.substeps);
-        let most = self.options.substeps * LONGEST_FRAME;
+    /// Of patches that may be held, those that then sleep: all that share a register must be held.
+    ///
+    /// - `held`: as [`FrameInput::held`]
+    pub fn sleepers(&self, held: &[bool]) -> Vec<bool> {
+        let mut out = vec![false; self.layout.len()];
+        for group in self.groups.iter().filter(|g| sleeps(g.patches(), held)) {
+            for &patch in group.patches() {
+                out[patch] = true;
+            }
+        }
+        out
+    }
+
+    /// Puts to sleep the groups of which all patches are held, and wakes the others.
+    ///
+    /// - `dt`: duration of the frame (s)
+    fn send_to_sleep(&mut self, held: &[bool], dt: f64) {
+        let mut has_changed = false;
+        let [now, next] = &mut self.ports;
+        for (index, group) in self.groups.iter_mut().enumerate() {
+            let sleeps = sleeps(group.patches(), held);
+            match (self.asleep[index], sleeps) {
+                (false, true) => {
+                    group.fall_asleep([&mut now[index], &mut next[index]]);
+                    for &patch in group.patches() {
+                        self.dreams[patch].is_new = true;
+                    }
+                }
+                (true, false) => {
+                    let [targets, anchors] = &self.dreamt;
+                    group.wake(dt, targets, anchors);
+                }
+                _ => {}
+            }
+            has_changed |= sleeps != self.asleep[index];
+            self.asleep[index] = sleeps;
+        }
+        if has_changed {
+            self.guard.forget_whole();
+        }
+    }
+
+    /// Lets patches that sleep follow their targets.
+    fn dream(&mut self, input: &FrameInput<'_>) {
+        let (groups, asleep) = (&self.groups, &self.asleep);
+        let [dreamt_targets, dreamt_anchors] = &mut self.dreamt;
+        for (patch, at) in self
+            .layout
+            .iter()
+            .enumerate()
+            .filter(|(_, at)| asleep[at.group])
+        {
+            let (target, positions) = (&input.targets[patch], &mut self.positions[patch]);
+            let (dream, dreamt) = (&mut self.dreams[patch], &mut dreamt_targets[patch]);
+            if std::mem::take(&mut dream.is_new) {
+                dream
+                    .displacements
+                    .resize(positions.len(), Vector3::zeros());
+                groups[at.group].write_displacements(at.lane, &mut dream.displacements);
+            } else if dreamt == target {
+                continue;
+            }
+            dreamt.clone_from(target);
+            if let Some(anchors) = input.anchors.get(patch) {
+                dreamt_anchors[patch].clone_from(anchors);
+            }
+            let followed = target.positions.iter().zip(&dream.displacements);
+            for (position, (target, displacement)) in positions.iter_mut().zip(followed) {
+                *position = target + displacement;
+            }
+        }
+    }
+
+    /// Substeps that a frame of `dt` seconds is cut into, at `substeps` per 1/60 s, or those of the
+    /// options.
+    pub fn substep_count(&self, dt: f64, substeps: Option<u32>) -> u32 {
+        let substeps = substeps.unwrap_or(self.options.substeps);
+        let wanted = dt * 60.0 * f64::from(substeps);
+        let most = substeps * LONGEST_FRAME;
         // A millionth less, so that rounding in dt does not add a substep.
         ((wanted * (1.0 - 1e-6)).ceil() as u32).clamp(1, most)
     }
@@ -325,12 +447,29 @@ impl Cloth {
     }
 
     fn write_positions(&mut self) {
-        let (layout, groups) = (&self.layout, &self.groups);
+        let (layout, groups, asleep) = (&self.layout, &self.groups, &self.asleep);
         self.positions
             .par_iter_mut()
             .zip(layout)
+            .filter(|(_, at)| !asleep[at.group])
             .for_each(|(out, at)| groups[at.group].write_positions(at.lane, out));
     }
+}
+
+fn sleeps(patches: &[usize], held: &[bool]) -> bool {
+    patches.iter().all(|&p| held.get(p) == Some(&true))
+}
+
+/// The groups that do not sleep.
+fn awake<'a>(
+    groups: &'a mut [Box<dyn PatchGroup>],
+    asleep: &'a [bool],
+) -> impl ParallelIterator<Item = &'a mut Box<dyn PatchGroup>> {
+    groups
+        .par_iter_mut()
+        .zip(asleep)
+        .filter(|(_, asleep)| !**asleep)
+        .map(|(group, _)| group)
 }
 
 /// Runs all substeps with the groups in step, as pairs couple them.
@@ -338,6 +477,7 @@ fn advance_together(
     groups: &mut [Box<dyn PatchGroup>],
     ports: &mut [Vec<Ports>; 2],
     substeps: &[Substep],
+    asleep: &[bool],
 ) {
     let [now, next] = ports;
     let Some(first) = substeps.first() else {
@@ -346,14 +486,18 @@ fn advance_together(
     groups
         .par_iter_mut()
         .zip(now.par_iter_mut())
-        .for_each(|(g, p)| g.predict(first, p));
+        .zip(asleep)
+        .filter(|(_, asleep)| !**asleep)
+        .for_each(|((g, p), _)| g.predict(first, p));
     for (k, substep) in substeps.iter().enumerate() {
         let following = substeps.get(k + 1);
         let shared: &[Ports] = now;
         groups
             .par_iter_mut()
             .zip(next.par_iter_mut())
-            .for_each(|(g, p)| {
+            .zip(asleep)
+            .filter(|(_, asleep)| !**asleep)
+            .for_each(|((g, p), _)| {
                 g.solve(substep, shared);
                 match following {
                     Some(following) => g.turn(following, p),

@@ -20,7 +20,6 @@ const LONGEST_FRAME: f64 = 10.0;
 /// Checks options.
 pub(crate) fn options(o: &ClothOptions) -> Result<(), ClothError> {
     let ranges = [
-        ("substeps", f64::from(o.substeps), 1.0, 4096.0),
         ("sweeps", f64::from(o.sweeps), 1.0, 64.0),
         ("rest_blend", o.rest_blend, 0.0, 1.0),
         ("rest_imperfection", o.rest_imperfection, 0.0, 1.0),
@@ -30,17 +29,27 @@ pub(crate) fn options(o: &ClothOptions) -> Result<(), ClothError> {
         ("lift", o.lift, 0.0, 1e3),
     ];
     for (name, value, low, high) in ranges {
-        // Written so that NaN is out of range.
-        if !(value >= low && value <= high) {
-            return Err(ClothError::Option {
-                name,
-                value,
-                low,
-                high,
-            });
-        }
+        within(name, value, low, high)?;
     }
+    substeps(o.substeps)?;
     field("standing gravity", &o.standing_gravity, HARDEST)
+}
+
+fn substeps(count: u32) -> Result<(), ClothError> {
+    within("substeps", f64::from(count), 1.0, 4096.0)
+}
+
+fn within(name: &'static str, value: f64, low: f64, high: f64) -> Result<(), ClothError> {
+    // Written so that NaN is out of range.
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(ClothError::Option {
+        name,
+        value,
+        low,
+        high,
+    })
 }
 
 /// Checks patches and their attachments.
@@ -175,6 +184,12 @@ pub(crate) fn frame(layout: &[PatchLayout], input: &FrameInput<'_>) -> Result<()
     }
     if let Some(gravity) = &input.gravity {
         field("gravity", gravity, HARDEST)?;
+    }
+    if !input.held.is_empty() {
+        count("held flags", layout.len(), input.held.len())?;
+    }
+    if let Some(substeps) = input.substeps {
+        self::substeps(substeps)?;
     }
     field("wind", &input.wind, 1e7)?;
     let head = &input.head;

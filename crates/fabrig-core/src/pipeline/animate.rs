@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::TimeStatistics;
 use super::contact::ContactSummary;
+use super::economy::{EconomyLog, EconomySummary};
 use super::frames::FrameMaker;
 use crate::Error;
 use crate::cloth::Counters;
@@ -82,6 +83,8 @@ pub struct AnimateReport {
     pub settle_rms_max: f64,
     /// What contact did; none where nothing could touch.
     pub contact: Option<ContactSummary>,
+    /// What was left out, and by how much the result may be off for it.
+    pub economy: EconomySummary,
     /// What reading the take had to decide.
     pub take: ClipNotes,
     /// What the recording holds.
@@ -259,6 +262,7 @@ struct Measures {
     recording_ms: Vec<f64>,
     guards: Counters,
     settle_rms_max: f64,
+    economy: EconomyLog,
 }
 
 /// A simulation on its way into a recording.
@@ -280,7 +284,9 @@ impl Run {
     fn advance(&mut self, dt: f64) -> Result<FrameReport, Error> {
         let clock = Instant::now();
         let report = self.simulation.advance(dt)?;
-        self.measures.simulation_ms.push(milliseconds(clock));
+        let ms = milliseconds(clock);
+        self.measures.simulation_ms.push(ms);
+        self.measures.economy.take(&report, ms);
         self.measures.cloth_ms.push(report.cloth_ms);
         self.measures.guards += report.step.counters;
         self.measures.settle_rms_max = self.measures.settle_rms_max.max(report.settle_rms);
@@ -318,6 +324,7 @@ impl Run {
             guards: measures.guards,
             settle_rms_max: measures.settle_rms_max,
             contact: self.maker.contact_summary(),
+            economy: measures.economy.summary(self.simulation.tolerance()),
             take,
             recording: whole.recording.clone(),
             foxglove_layout: whole.foxglove_layout.clone(),

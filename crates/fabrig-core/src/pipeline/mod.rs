@@ -22,6 +22,7 @@
 mod animate;
 mod contact;
 mod cost;
+mod economy;
 mod expression_scans;
 mod frames;
 mod live;
@@ -39,6 +40,7 @@ pub use animate::{
 };
 pub use contact::{ColliderForce, ContactSummary};
 pub use cost::{CostRow, cost};
+pub use economy::EconomySummary;
 pub use expression_scans::{ExpressionScan, ScanReport};
 pub use live::LiveFace;
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};

@@ -263,6 +263,21 @@ impl Rig {
         at: ShapeWeights<'_>,
         out: &mut [NodeTargets],
     ) -> Result<(), TransferError> {
+        self.targets_of(at, |_| true, out)
+    }
+
+    /// As [`Self::targets`], of the patches of which `is_wanted` says so; the others are left as
+    /// they are.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::targets`].
+    pub fn targets_of(
+        &self,
+        at: ShapeWeights<'_>,
+        is_wanted: impl Fn(usize) -> bool + Sync,
+        out: &mut [NodeTargets],
+    ) -> Result<(), TransferError> {
         self.check_weights(at.weights)?;
         if let Some(rates) = at.rates {
             self.check_weights(rates)?;
@@ -277,7 +292,9 @@ impl Rig {
         self.patches
             .par_iter()
             .zip(out)
-            .for_each(|(patch, (positions, velocities))| {
+            .enumerate()
+            .filter(|(index, _)| is_wanted(*index))
+            .for_each(|(_, (patch, (positions, velocities)))| {
                 let neutral: Vec<Point3<f32>> =
                     patch.patch.neutral.iter().map(|q| q.cast()).collect();
                 positions.resize(neutral.len(), Point3::origin());

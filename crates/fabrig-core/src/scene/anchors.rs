@@ -142,6 +142,13 @@ impl BoneAnchors {
             out.velocities.push(velocity);
         }
     }
+
+    /// How far each node is held from where its muscle shapes want it. (mm)
+    pub(super) fn pulls(&self, target: &PatchMotion, held: &PatchMotion) -> Vec<Vector3<f32>> {
+        let ends = self.anchors.iter().zip(&held.positions);
+        ends.map(|(anchor, held)| held - target.positions[anchor.node as usize])
+            .collect()
+    }
 }
 
 fn is_bone(body: RigidBody) -> bool {

@@ -75,12 +75,17 @@ const STILL: f32 = 4e-3;
 /// Steps after which a face is taken as it is.
 const LONGEST_HOLD: usize = 240;
 
-/// Holds a pose until the face is still, or four seconds long.
+/// Holds a pose until the face is still, or four seconds long. Everything is modelled, whatever the
+/// scene's economy.
 ///
 /// # Errors
 ///
 /// [`SceneError`] where the pose does not fit the rig.
 pub fn hold_pose(simulation: &mut Simulation, pose: &FacePose) -> Result<(), SceneError> {
+    simulation.without_economy(|simulation| hold(simulation, pose))
+}
+
+fn hold(simulation: &mut Simulation, pose: &FacePose) -> Result<(), SceneError> {
     simulation.reset(pose.clone())?;
     let mut before = simulation.skin().to_vec();
     for _ in 0..LONGEST_HOLD / STEPS_BETWEEN_LOOKS {

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::economy::Economy;
 use super::faces::{Placement, RecordingChoice, SceneFace, Simulate};
 use super::fields::{HeadDrive, OverTime, RadialForce, Shake, Turbulence};
 use super::text::{self, SceneSource};
@@ -75,6 +76,8 @@ pub struct Scene {
     pub colliders: Vec<Collider>,
     /// Which patches are cloth.
     pub simulate: Simulate,
+    /// What may be left out, and how far the result may then be off.
+    pub economy: Economy,
     /// Changes to the materials of the rig, and materials of the scene's own, by name.
     pub materials: BTreeMap<String, MaterialEdit>,
     /// Wrinkle maps, by names of the artist's own.
@@ -109,6 +112,7 @@ impl Default for Scene {
             contact: ContactOptions::default(),
             colliders: Vec::new(),
             simulate: Simulate::default(),
+            economy: Economy::default(),
             materials: BTreeMap::new(),
             wrinkles: BTreeMap::new(),
             fps: None,
@@ -166,6 +170,14 @@ impl Scene {
             source,
         })?;
         text::from_toml(&text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// The scene with everything modelled: for measurements of the solver.
+    pub fn without_economy(self) -> Self {
+        Self {
+            economy: Economy::OFF,
+            ..self
+        }
     }
 
     /// The default scene without mass: patches stand where the muscle shapes want them.

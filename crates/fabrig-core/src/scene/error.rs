@@ -16,6 +16,15 @@ pub enum SceneError {
         /// What was given.
         dt: f64,
     },
+    /// The tolerance of the economy is out of range.
+    #[error(
+        "'{found}' is no tolerance: expected 0 (all is modelled) to 10 mm, or 0 to 5 % of the face's \
+         height, such as '0.05 %'"
+    )]
+    Tolerance {
+        /// What was given.
+        found: Box<str>,
+    },
     /// A scene file cannot be read.
     #[error("cannot read {}", path.display())]
     Read {

@@ -20,7 +20,8 @@ pub fn face_cases(rig: &Arc<Rig>) -> Result<Vec<CaseResult>, SceneError> {
 
 /// Every shape of the face at weight 1, antagonists together, from one frame to the next.
 fn all_shapes(rig: &Arc<Rig>) -> Result<CaseResult, SceneError> {
-    let mut simulation = Simulation::new(Arc::clone(rig), Scene::default(), None)?;
+    let mut simulation =
+        Simulation::new(Arc::clone(rig), Scene::default().without_economy(), None)?;
     let mut pose = FacePose::neutral(rig.shape_names.len());
     pose.weights.fill(1.0);
     let mut frozen = 0;
@@ -42,7 +43,8 @@ fn all_shapes(rig: &Arc<Rig>) -> Result<CaseResult, SceneError> {
 /// The same pose with the head at the origin and a kilometre away.
 fn far_from_the_origin(rig: &Arc<Rig>) -> Result<CaseResult, SceneError> {
     let run = |away: f64| -> Result<_, SceneError> {
-        let mut simulation = Simulation::new(Arc::clone(rig), Scene::default(), None)?;
+        let mut simulation =
+            Simulation::new(Arc::clone(rig), Scene::default().without_economy(), None)?;
         let mut pose = FacePose::neutral(rig.shape_names.len());
         for (i, weight) in pose.weights.iter_mut().enumerate() {
             *weight = if i % 3 == 0 { 0.5 } else { 0.0 };

@@ -1,11 +1,12 @@
 //! Stepping a rig through a take.
 
 mod drive;
+mod thrift;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Attachment;
@@ -19,6 +20,7 @@ use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
 use crate::scene::bodies::{Eyeball, eyeballs};
 use crate::scene::contact::FaceContact;
+use crate::scene::economy::{EconomyReport, Thrift};
 use crate::scene::fields::{Curve, Fields, HeadDrive};
 use crate::scene::modelled::{Modelled, middle};
 use crate::scene::skin_contact::{SkinContact, SkinContactReport};
@@ -80,6 +82,8 @@ pub struct FrameReport {
     pub settle_max: f64,
     /// What contact did to the skin.
     pub skin_contact: SkinContactReport,
+    /// What was left out.
+    pub economy: EconomyReport,
 }
 
 /// Where a rigid piece of the face stands.
@@ -103,6 +107,15 @@ pub struct Simulation {
     sample: Sample,
     cloth: Option<Cloth>,
     modelled: Modelled,
+    /// Decides what is left out; none where everything is modelled.
+    thrift: Option<Thrift>,
+    /// Patches that moved since the skin did.
+    has_moved: Vec<bool>,
+    /// Whether the skin is as the last frame left it.
+    has_skin: bool,
+    skin_moved: usize,
+    /// How far nodes may go before they move the skin. (mm)
+    skin_slack: f32,
     fields: Fields,
     /// Where fields are felt, for the whole face. [mm, head frame]
     middle: Point,
@@ -134,13 +147,15 @@ impl Simulation {
                 count: scene.faces.len(),
             });
         }
+        scene.economy.check()?;
         let rig = scene.dressed(rig)?;
-        let (modelled, patches) = Modelled::new(&rig, &scene, cloth_patches(&rig)?)?;
+        let all = cloth_patches(&rig)?;
+        let (modelled, patches) = Modelled::new(&rig, &scene, all.clone())?;
         let names: Vec<&str> = rig.shape_names.iter().map(String::as_str).collect();
         let channels = clip
             .as_ref()
             .map_or_else(|| vec![None; names.len()], |c| c.channel_indices(&names));
-        let anchored = rig
+        let anchored: Vec<BoneAnchors> = rig
             .patches
             .iter()
             .map(|patch| BoneAnchors::new(&rig, patch))
@@ -162,6 +177,15 @@ impl Simulation {
             let is_folding: Vec<bool> = nodes.iter().map(|node| node.rest_blend < 1.0).collect();
             deformer = deformer.turning_across(patch, &is_folding);
         }
+        for part in &rig.parts {
+            deformer.move_always(&part.vertices);
+        }
+        let is_thrifty =
+            cloth.is_some() && contact.is_none() && scene.economy.tolerance.on(&rig) > 0.0;
+        let cloth_of = (0..all.len()).map(|p| modelled.cloth_of(p)).collect();
+        let thrift = is_thrifty
+            .then(|| Thrift::new(&rig, &all, cloth_of, &anchored, scene.economy, &scene.cloth))
+            .transpose()?;
         let count = rig.patches.len();
         let time = clip.as_ref().map_or(0.0, |c| c.times()[0]);
         let head_keys = match &scene.head_motion {
@@ -171,6 +195,11 @@ impl Simulation {
         let mut simulation = Self {
             pose: FacePose::neutral(rig.shape_names.len()),
             modelled,
+            has_moved: vec![true; count],
+            has_skin: false,
+            skin_moved: 0,
+            skin_slack: thrift.as_ref().map_or(0.0, Thrift::skin_slack),
+            thrift,
             fields: Fields::new(&scene),
             middle: middle(&rig),
             head_keys,
@@ -204,6 +233,7 @@ impl Simulation {
     ///
     /// [`SceneError`] where weights do not fit the rig.
     pub fn reset(&mut self, pose: FacePose) -> Result<(), SceneError> {
+        self.forget_frames();
         self.evaluate(pose)?;
         self.begin_contact(self.time);
         let (targets, anchors) = self.modelled.gather(&self.targets, &self.anchors);
@@ -218,7 +248,16 @@ impl Simulation {
     /// Takes a pose at a time without moving anything: only the muscle shapes are evaluated.
     pub(super) fn pose_to(&mut self, pose: FacePose, time: f64) -> Result<(), SceneError> {
         self.time = time;
+        self.forget_frames();
         self.evaluate(pose)
+    }
+
+    /// Nothing is known of frames before.
+    fn forget_frames(&mut self) {
+        if let Some(thrift) = &mut self.thrift {
+            thrift.reset(&self.scene.cloth);
+        }
+        self.has_skin = false;
     }
 
     /// Goes `dt` seconds on along the clip.
@@ -248,9 +287,10 @@ impl Simulation {
         let clock = Instant::now();
         self.begin_contact(self.time + dt);
         let gravity = self.acceleration(self.time + dt);
+        let to_head = self.pose.head.rotation.inverse();
+        let plan = self.plan(dt, gravity);
         let (targets, anchors) = self.modelled.gather(&self.targets, &self.anchors);
         if let Some(cloth) = &mut self.cloth {
-            let to_head = self.pose.head.rotation.inverse();
             let input = FrameInput {
                 dt,
                 targets,
@@ -258,17 +298,22 @@ impl Simulation {
                 gravity: Some(gravity.cast()),
                 wind: (to_head * self.pose.wind).cast(),
                 head: self.pose.head_motion,
+                substeps: plan.substeps,
+                held: &plan.held,
             };
             report.step = match &mut self.contact {
                 Some(c) => cloth.step_with(&input, &mut c.contact)?,
                 None => cloth.step(&input)?,
             };
         }
+        self.learn(dt);
         report.cloth_ms = milliseconds(clock);
 
         let clock = Instant::now();
+        self.has_skin &= !plan.is_whole;
         self.move_skin()?;
         report.skin_ms = milliseconds(clock);
+        report.economy = self.economy_report(dt, &plan, &report.step);
         report.skin_contact = self.skin_report;
 
         self.time += dt;
@@ -348,6 +393,12 @@ impl Simulation {
             Some(_) => self.modelled.patches().len(),
             None => 0,
         }
+    }
+
+    /// By how much a frame may differ from the full model's; 0 where everything is modelled.
+    /// (mm)
+    pub fn tolerance(&self) -> f64 {
+        self.thrift.as_ref().map_or(0.0, Thrift::tolerance)
     }
 
     /// The rig.
@@ -467,20 +518,41 @@ impl Simulation {
             weights: &pose.weights,
             rates: Some(&pose.rates),
         };
-        self.rig.targets(at, &mut self.evaluated)?;
+        match &mut self.thrift {
+            Some(thrift) => {
+                let moving = thrift.moving(&pose);
+                self.has_moved.copy_from_slice(moving);
+                self.rig
+                    .targets_of(at, |patch| moving[patch], &mut self.evaluated)?;
+            }
+            None => {
+                self.has_moved.fill(true);
+                self.rig.targets(at, &mut self.evaluated)?;
+            }
+        }
         self.world = match self.scene.place.to_world() {
             Some(place) => place * pose.head,
             None => pose.head,
         };
         self.pose = pose;
-        for (target, (positions, velocities)) in self.targets.iter_mut().zip(&mut self.evaluated) {
-            std::mem::swap(&mut target.positions, positions);
-            std::mem::swap(&mut target.velocities, velocities);
+        let evaluated = self.targets.iter_mut().zip(&mut self.evaluated);
+        for ((target, (positions, velocities)), &moves) in evaluated.zip(&self.has_moved) {
+            if moves {
+                std::mem::swap(&mut target.positions, positions);
+                std::mem::swap(&mut target.velocities, velocities);
+            } else {
+                target.velocities.fill(Vector3::zeros());
+            }
         }
         let mandible = Mandible::at(&self.rig, &self.pose.weights, &self.pose.rates);
         let held = self.anchored.iter().zip(&self.targets);
-        for ((anchored, target), anchors) in held.zip(&mut self.anchors) {
-            anchored.place(&mandible, target, anchors);
+        let held = held.zip(&mut self.anchors).zip(&self.has_moved);
+        for (((anchored, target), anchors), &moves) in held {
+            if moves {
+                anchored.place(&mandible, target, anchors);
+            } else {
+                anchors.velocities.fill(Vector3::zeros());
+            }
         }
         Ok(())
     }
@@ -497,8 +569,22 @@ impl Simulation {
             .map(|p| positions_of(p, self.cloth.as_ref(), &self.modelled, &self.targets))
             .collect();
         let mandible = self.rig.mandible(&self.pose.weights);
-        self.deformer
-            .deform(&self.rig.binding, &nodes, mandible, &mut self.skin)?;
+        let is_again = self.has_skin && self.scene.economy.skin && self.skin_contact.is_none();
+        if is_again {
+            self.skin_moved = self.deformer.deform_again(
+                &self.rig.binding,
+                &nodes,
+                mandible,
+                |patch| self.has_moved[patch],
+                self.skin_slack,
+                &mut self.skin,
+            )?;
+        } else {
+            self.deformer
+                .deform(&self.rig.binding, &nodes, mandible, &mut self.skin)?;
+            self.skin_moved = self.skin.len();
+        }
+        self.has_skin = true;
         let eyes = [0, 1].map(|e| self.eye(e) * self.eyeballs[e].rest());
         if let Some(contact) = &mut self.skin_contact {
             let colliders = self.contact.as_ref().map_or(&[][..], |c| c.poses());

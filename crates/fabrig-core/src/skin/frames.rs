@@ -82,18 +82,28 @@ impl NodeFrames {
     /// A patch that stands at rest gives exactly zero.
     pub fn affines(&self, now: &[Point3<f32>], out: &mut [NodeAffine]) {
         for (i, out) in out.iter_mut().enumerate() {
-            let frame_now = frame(self.grid, now, i, self.reach(i));
-            // Equal bits must give no turn at all: F F^T is only nearly one.
-            let turn = if frame_now == self.frames[i] {
-                Matrix3::zeros()
-            } else {
-                frame_now * self.frames[i].transpose() - Matrix3::identity()
-            };
-            let rest = self.rest[i].coords;
-            *out = NodeAffine {
-                turn,
-                shift: (now[i].coords - rest) - turn * rest,
-            };
+            *out = self.affine(now, i);
+        }
+    }
+
+    /// What one node does, as [`Self::affines`]. (mm)
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node.
+    #[inline(always)]
+    pub fn affine(&self, now: &[Point3<f32>], node: usize) -> NodeAffine {
+        let frame_now = frame(self.grid, now, node, self.reach(node));
+        // Equal bits must give no turn at all: F F^T is only nearly one.
+        let turn = if frame_now == self.frames[node] {
+            Matrix3::zeros()
+        } else {
+            frame_now * self.frames[node].transpose() - Matrix3::identity()
+        };
+        let rest = self.rest[node].coords;
+        NodeAffine {
+            turn,
+            shift: (now[node].coords - rest) - turn * rest,
         }
     }
 }

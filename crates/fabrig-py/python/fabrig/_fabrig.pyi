@@ -326,6 +326,7 @@ class Simulation:
         gravity: ArrayLike | None = None,
         wind: ArrayLike | None = None,
         substeps: int | None = None,
+        economy: float | str | None = None,
         dynamics: bool = True,
     ) -> Self: ...
     def step(
@@ -485,6 +486,7 @@ def animate(
     gravity: ArrayLike | None = None,
     wind: ArrayLike | None = None,
     substeps: int | None = None,
+    economy: float | str | None = None,
     dynamics: bool = True,
     record: Sequence[str] | None = None,
     skin_hz: float | None = None,

@@ -3,6 +3,7 @@
 mod batch;
 mod chain;
 mod demo_scene;
+mod economy;
 mod pareto;
 mod plot;
 mod registration;
@@ -24,6 +25,7 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
         BenchCommand::Chain { cloth, json } => chain::run(console, *cloth, *json),
         BenchCommand::Registration(args) => registration::run(console, args),
         BenchCommand::Batch(args) => batch::run(console, args),
+        BenchCommand::Economy(args) => economy::run(console, args),
         BenchCommand::Pareto(args) => pareto::run(console, args),
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),

@@ -31,6 +31,8 @@ impl SceneFrame {
             gravity: self.gravity,
             wind: self.wind,
             head: self.head,
+            substeps: None,
+            held: &[],
         }
     }
 }

@@ -114,7 +114,8 @@ impl<R: Real> Group<R> {
         for anchor in &mut self.anchors {
             for (lane, &patch) in self.patches.iter().enumerate() {
                 if anchor.indices[lane] != NONE {
-                    anchor.load(lane, dt, self.origin.lane(lane), motions.get(patch));
+                    let motion = motions.get(patch).filter(|m| !m.positions.is_empty());
+                    anchor.load(lane, dt, self.origin.lane(lane), motion);
                 }
             }
         }

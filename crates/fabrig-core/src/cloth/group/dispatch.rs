@@ -1,6 +1,6 @@
 //! A group behind its interface, with the hot parts compiled for the processor's vectors.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::descent::merge;
 use super::instructions::vectorized;
@@ -185,9 +185,26 @@ impl<R: Real> PatchGroup for Group<R> {
         }
     }
 
+    fn fall_asleep(&mut self, ports: [&mut Ports; 2]) {
+        for ports in ports {
+            self.write_sleeping_ports(ports);
+        }
+    }
+
+    fn wake(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]) {
+        self.begin_frame(dt, targets, anchors);
+        self.follow_targets();
+    }
+
     fn freeze(&mut self, lane: usize) {
         self.clear_lane(lane);
         self.lane_states[lane].energy = 0.0;
+    }
+
+    fn write_displacements(&self, lane: usize, displacements: &mut [Vector3<f32>]) {
+        for (out, u) in displacements.iter_mut().zip(&self.displacements) {
+            *out = Vector3::from(u.lane(lane).map(|x| x as f32));
+        }
     }
 
     fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]) {

@@ -147,6 +147,19 @@ impl<R: Real> Group<R> {
         ]
     }
 
+    /// Lets nodes keep their displacement through a frame and move as their targets do.
+    pub(super) fn follow_targets(&mut self) {
+        self.velocities.copy_from_slice(&self.end_velocities);
+        self.previous_velocities
+            .copy_from_slice(&self.end_velocities);
+        self.target_steps.fill(Vec3::zero());
+        self.previous_displacements
+            .copy_from_slice(&self.displacements);
+        for state in &mut self.lane_states {
+            state.has_history = false;
+        }
+    }
+
     pub(super) fn clear_lane(&mut self, lane: usize) {
         for i in 0..self.displacements.len() {
             let velocity = self.end_velocities[i].lane(lane);

@@ -1,6 +1,6 @@
 //! What the solver sees of a group, whatever its lane type.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::cloth::constraints::attachment::{PairEnd, PairVector};
 use crate::cloth::input::PatchMotion;
@@ -138,8 +138,15 @@ pub(crate) trait PatchGroup: Send + Sync {
     /// Takes backward Euler steps for a patch for `frames` frames, solved by descent if
     /// `is_robust`.
     fn fall_back(&mut self, lane: usize, frames: u32, is_robust: bool);
+    /// Tells the other groups that this one's nodes keep their displacement from now on.
+    fn fall_asleep(&mut self, ports: [&mut Ports; 2]);
+    /// Wakes at the end of a frame of `dt` seconds that led to `targets`: nodes have kept their
+    /// displacement, and move as their targets do.
+    fn wake(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Puts a patch back to its target.
     fn freeze(&mut self, lane: usize);
+    /// Writes displacements of a patch from its targets. (mm)
+    fn write_displacements(&self, lane: usize, displacements: &mut [Vector3<f32>]);
     /// Writes positions of a patch. [mm, head frame]
     fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]);
     /// Position and velocity of one node in full precision. [mm, mm/s]

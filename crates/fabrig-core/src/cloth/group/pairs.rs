@@ -5,6 +5,9 @@ use super::state::Group;
 use crate::cloth::constraints::attachment::{OrderFreeSum, PairEnd, PairVector, pair_share};
 use crate::cloth::lanes::Real;
 
+/// Marks versions of masses that do not yield.
+const SLEEPING: u64 = 1 << 40;
+
 /// The pairs of a group, made ready for substeps: one row of partners after the other.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PairTable {
@@ -74,6 +77,22 @@ impl<R: Real> Group<R> {
                 });
             }
         }
+    }
+
+    /// What partners see of a group that sleeps: nodes that keep their displacement.
+    pub(super) fn write_sleeping_ports(&self, ports: &mut Ports) {
+        let pairs = &self.pairs;
+        ports.displacements.clear();
+        ports.ends.clear();
+        for (k, &(node, lane)) in pairs.nodes.iter().enumerate() {
+            let [x, y, z] = self.displacements[node as usize].lane(lane as usize);
+            ports.displacements.push([x, y, z, 0.0]);
+            ports.ends.push(PairEnd {
+                inv_mass: 0.0,
+                pair_count: pairs.row(k).len() as f64,
+            });
+        }
+        ports.version = SLEEPING + self.masses_version;
     }
 
     /// Projects all pairs of the group's nodes from what `ports` say, its own among them.

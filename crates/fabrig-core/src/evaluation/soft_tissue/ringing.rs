@@ -118,7 +118,7 @@ fn measured_rings(
     let still = FacePose::neutral(rig.shape_names.len());
     let mut pushed = still.clone();
     pushed.head_motion.linear_acceleration = acceleration;
-    let mut simulation = Simulation::new(Arc::clone(rig), scene.clone(), None)?;
+    let mut simulation = Simulation::new(Arc::clone(rig), scene.clone().without_economy(), None)?;
     for _ in 0..HELD_FRAMES {
         simulation.advance_to(pushed.clone(), STEP)?;
     }

@@ -70,7 +70,7 @@ pub fn pad_volumes(
     if pads.is_empty() {
         return Err(SoftTissueError::NoPads);
     }
-    let mut simulation = Simulation::new(Arc::clone(rig), scene.clone(), None)?;
+    let mut simulation = Simulation::new(Arc::clone(rig), scene.clone().without_economy(), None)?;
     let pose = FacePose::neutral(rig.shape_names.len());
     let at_rest: Vec<f64> = pads.iter().map(|pad| pad.volume(&simulation)).collect();
     let mut found: Vec<PadVolume> = pads
@@ -89,7 +89,7 @@ pub fn pad_volumes(
             gravity: OverTime::Constant(*gravity),
             ..scene.clone()
         };
-        simulation = Simulation::new(Arc::clone(rig), scene, None)?;
+        simulation = Simulation::new(Arc::clone(rig), scene.without_economy(), None)?;
         for _ in 0..HELD_FRAMES {
             simulation.advance_to(pose.clone(), STEP)?;
         }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::node::{Entry, Node, Value, line_and_column};
 use super::schema::{JOIN, Key, Kind, SCENE};
 use crate::facs::nearest_name;
-use crate::scene::{Hint, SceneError, TextPlace};
+use crate::scene::{Hint, SceneError, TextPlace, Tolerance};
 
 /// Checks the tree of a scene. Returns where the value of each key stands, by path.
 ///
@@ -114,6 +114,13 @@ impl Walk<'_> {
                 Some(x) if (*low..=*high).contains(&x) => Ok(()),
                 _ => wrong(self),
             },
+            (Kind::Tolerance([most, _]), value) => {
+                let is_read = match value {
+                    Value::Text(text) => text.parse::<Tolerance>().is_ok(),
+                    _ => number(value).is_some_and(|x| (0.0..=*most).contains(&x)),
+                };
+                if is_read { Ok(()) } else { wrong(self) }
+            }
             (Kind::Integer { low, high }, Value::Integer(x))
                 if (i128::from(*low)..=i128::from(*high)).contains(x) =>
             {

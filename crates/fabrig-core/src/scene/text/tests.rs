@@ -10,7 +10,9 @@ use crate::cloth::{Cloth, ClothOptions, Material};
 use crate::collision::{Collider, ContactOptions, Stickiness};
 use crate::edit::WrinkleEdit;
 use crate::scene::fields::{RadialForce, Shake, Turbulence};
-use crate::scene::{Placement, RecordingChoice, Scene, SceneError, SceneFace, Simulate, TextPlace};
+use crate::scene::{
+    Economy, Placement, RecordingChoice, Scene, SceneError, SceneFace, Simulate, TextPlace,
+};
 
 type Wrap<'a> = &'a dyn Fn(Value) -> Value;
 
@@ -129,6 +131,7 @@ fn the_schema_has_the_fields_of_the_types() {
         (fields::<Turbulence>(), keys_of("turbulence")),
         (fields::<Shake>(), keys_of("shake")),
         (fields::<Simulate>(), keys_of("simulate")),
+        (fields::<Economy>(), keys_of("economy")),
         (fields::<RecordingChoice>(), keys_of("recording")),
         (fields::<WrinkleEdit>(), keys_of("wrinkles")),
         (fields::<RadialForce>(), keys_of("forces")),
@@ -239,7 +242,17 @@ fn said(text: &str) -> (TextPlace, String) {
 
 #[test]
 fn what_is_wrong_is_told_with_place_key_expectation_and_nearest_name() {
-    let cases: [(&str, [usize; 2], &[&str]); 19] = [
+    let cases: [(&str, [usize; 2], &[&str]); 21] = [
+        (
+            "[economy]\ntolerance = \"6 %\"",
+            [2, 13],
+            &["`economy.tolerance`", "0 to 5 %", "found '6 %'"],
+        ),
+        (
+            "[economy]\ntolerance = -0.1",
+            [2, 13],
+            &["`economy.tolerance`", "from 0 to 10 (mm)", "-0.1"],
+        ),
         (
             "[place]\nposition = [0, 0, 1]\n[[faces]]\nrig = \"a.fabrig\"",
             [1, 1],

@@ -69,6 +69,8 @@ pub(super) enum Kind {
         high: u64,
     },
     Text,
+    /// Millimetres up to the first, or a text of percent up to the second.
+    Tolerance([f64; 2]),
     /// A file.
     Path,
     Word(&'static [&'static str]),
@@ -101,6 +103,11 @@ impl Kind {
             Self::Number { low, high } => format!("a number from {low} to {high}"),
             Self::Integer { low, high } => format!("a whole number from {low} to {high}"),
             Self::Text => "a text".to_owned(),
+            Self::Tolerance([mm, percent]) => {
+                format!(
+                    "a number from 0 to {mm} (mm), or a text of 0 to {percent} %, such as '0.05 %'"
+                )
+            }
             Self::Path => "the path of a file, as text".to_owned(),
             Self::Word(words) => format!("one of {}", quoted(words.iter())),
             Self::Vector { .. } => "three numbers [x, y, z]".to_owned(),

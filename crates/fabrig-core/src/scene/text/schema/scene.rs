@@ -4,6 +4,7 @@ use super::cloth::{CLOTH, CONTACT, MATERIAL, WRINKLES};
 use super::world::{COLLIDER, FORCE, SHAKE, TURBULENCE};
 use super::{Key, Kind, NAMES, PLACE, RATE, TIME, from_to, positive, vector};
 use crate::recording::RecordedKind;
+use crate::scene::Tolerance;
 
 pub(in crate::scene::text) const SCENE: &[Key] = &[
     Key::new(
@@ -72,6 +73,11 @@ pub(in crate::scene::text) const SCENE: &[Key] = &[
         "{}",
     ),
     Key::new("simulate", Kind::Table(SIMULATE), "which patches are cloth"),
+    Key::new(
+        "economy",
+        Kind::Table(ECONOMY),
+        "what may be left out, and how far the result may then be off",
+    ),
     Key::new("recording", Kind::Table(RECORDING), "what is recorded"),
     Key::new(
         "materials",
@@ -118,6 +124,31 @@ pub(super) const PLACEMENT: &[Key] = &[
         vector(1e3),
         "about it: an axis times an angle (rad); [-1.5708, 0, 0] lies the face on its back",
     ),
+];
+
+pub(super) const ECONOMY: &[Key] = &[
+    Key::new(
+        "tolerance",
+        Kind::Tolerance(Tolerance::MOST),
+        "rms over any patch against the full model (mm, or \"0.05 %\" of the face's height); \"off\" models \
+         everything",
+    ),
+    Key::new(
+        "sleep",
+        Kind::Flag,
+        "patches sleep while nothing acts on them",
+    ),
+    Key::new(
+        "quasi_static",
+        Kind::Flag,
+        "they sleep while their muscle shapes move, too, where these alone say where they are",
+    ),
+    Key::new(
+        "substeps",
+        Kind::Flag,
+        "frames take as few substeps as the motion allows",
+    ),
+    Key::new("skin", Kind::Flag, "skin moves only where its patches do"),
 ];
 
 pub(super) const SIMULATE: &[Key] = &[
