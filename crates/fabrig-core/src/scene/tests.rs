@@ -32,7 +32,7 @@ pub(crate) fn coarse_rig() -> Arc<Rig> {
 const DT: f64 = 1.0 / 60.0;
 
 fn simulation(text: &str) -> Simulation {
-    let scene = Scene::from_toml(text).unwrap();
+    let scene = Scene::from_toml(text).unwrap().without_economy();
     Simulation::new(Arc::clone(&RIG), scene, None).unwrap()
 }
 
