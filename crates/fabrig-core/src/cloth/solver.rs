@@ -31,7 +31,8 @@ pub struct Cloth {
     asleep: Vec<bool>,
     /// What patches do that sleep, one per patch.
     dreams: Vec<Dream>,
-    /// Motions of targets and anchors that sleeping patches last followed.
+    /// Motions of targets in the last frame in which any patch slept, and of the anchors of those
+    /// that did.
     dreamt: [Vec<PatchMotion>; 2],
     monitors: Vec<Vec<Monitor>>,
     guard: Guard,
@@ -385,18 +386,21 @@ impl Cloth {
         }
     }
 
-    /// Lets patches that sleep follow their targets.
+    /// Lets patches that sleep follow their targets, and remembers where all went.
     fn dream(&mut self, input: &FrameInput<'_>) {
+        if !self.asleep.contains(&true) {
+            return;
+        }
         let (groups, asleep) = (&self.groups, &self.asleep);
         let [dreamt_targets, dreamt_anchors] = &mut self.dreamt;
-        for (patch, at) in self
-            .layout
-            .iter()
-            .enumerate()
-            .filter(|(_, at)| asleep[at.group])
-        {
-            let (target, positions) = (&input.targets[patch], &mut self.positions[patch]);
-            let (dream, dreamt) = (&mut self.dreams[patch], &mut dreamt_targets[patch]);
+        for (patch, at) in self.layout.iter().enumerate() {
+            let (target, dreamt) = (&input.targets[patch], &mut dreamt_targets[patch]);
+            if !asleep[at.group] {
+                // Pads that wake ask where what they lie on was.
+                dreamt.clone_from(target);
+                continue;
+            }
+            let (dream, positions) = (&mut self.dreams[patch], &mut self.positions[patch]);
             if std::mem::take(&mut dream.is_new) {
                 dream
                     .displacements
