@@ -16,8 +16,8 @@ mod tools;
 pub(crate) use animate::{AnimateArgs, ContactPairs, DemoArgs, DemoScene, SceneArgs};
 pub(crate) use batch::{BatchArgs, BenchBatchArgs, BenchOutput};
 pub(crate) use bench::{
-    BenchCommand, BenchEconomyArgs, BenchParetoArgs, BenchRegistrationArgs, BenchRuntimeArgs,
-    BenchSoftTissueArgs, BenchStabilityArgs, BenchTable3Args, BenchWrinklesArgs,
+    BenchCommand, BenchEconomyArgs, BenchParetoArgs, BenchRegistrationArgs, BenchResolutionArgs,
+    BenchRuntimeArgs, BenchSoftTissueArgs, BenchStabilityArgs, BenchTable3Args, BenchWrinklesArgs,
 };
 pub(crate) use export::{ConvertArgs, ExportArgs, LayoutArgs, Target};
 pub(crate) use look::{InfoArgs, RenderArgs, Zoom};

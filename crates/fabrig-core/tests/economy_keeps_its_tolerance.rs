@@ -15,7 +15,7 @@ use std::sync::Arc;
 use fabrig_core::motion::{Clip, ReadOptions, parse_keys, read};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{
-    Economy, EconomyCase, FrameReport, Scene, Simulation, Tolerance, economy_case,
+    Economy, EconomyCase, FrameReport, Scene, Simulation, Tolerance, active_take, economy_case,
     random_economy_case,
 };
 use fabrig_core::template::demo_take;
@@ -26,8 +26,10 @@ const FPS: f64 = 60.0;
 const FRAMES: usize = 620;
 /// (mm)
 const TOLERANCES: [f64; 3] = [0.05, 0.1, 0.2];
-/// Frames after a storm in which what grew in it dies away.
-const AFTER_STORM: usize = 60;
+/// The whole of the bundled take.
+const ALL_FRAMES: usize = 720;
+/// What rounding alone may have grown to in a storm, whatever the tolerance. (mm)
+const GROWN_ROUNDING: f64 = 0.1;
 
 /// The lower half of the face is still.
 const UPPER_HALF: &str = "fabrig-keys 1
@@ -46,12 +48,12 @@ fn rig() -> &'static Arc<Rig> {
 
 fn run(clip: &Clip, economy: Economy, from: f64, frames: usize) -> EconomyCase {
     let of = (&Scene::default(), clip);
-    economy_case("a take", rig(), of, economy, [from, 1.0 / FPS], frames).unwrap()
+    economy_case("a take", rig(), of, economy, [from, 1.0 / FPS], frames, 1).unwrap()
 }
 
-/// No bound is violated, and outside of storms no frame is off by more than the tolerance.
+/// No bound is violated, and no frame is off by more than the tolerance. In a storm two runs that
+/// ever differed in their last bits differ by what these grow to.
 fn assert_kept(case: &EconomyCase) {
-    let mut since_storm = AFTER_STORM;
     for (k, frame) in case.frames.iter().enumerate() {
         let bound = frame.report.bound;
         let slack = 2e-4;
@@ -61,20 +63,18 @@ fn assert_kept(case: &EconomyCase) {
             case.name,
             frame.patch
         );
-        since_storm = if frame.report.is_storm {
-            0
+        let most = if frame.report.is_storm {
+            case.tolerance.max(GROWN_ROUNDING)
         } else {
-            since_storm + 1
+            case.tolerance
         };
-        if since_storm > AFTER_STORM {
-            let off = frame.patch.max(frame.skin);
-            assert!(
-                off <= case.tolerance + slack,
-                "{}, frame {k}: off by {off}, tolerance {}",
-                case.name,
-                case.tolerance
-            );
-        }
+        let off = frame.patch.max(frame.skin);
+        assert!(
+            off <= most + slack,
+            "{}, frame {k}: off by {off}, tolerance {}",
+            case.name,
+            case.tolerance
+        );
     }
 }
 
@@ -82,10 +82,60 @@ fn assert_kept(case: &EconomyCase) {
 fn frames_keep_to_the_tolerance_and_to_their_bounds() {
     let clip = parse_keys(demo_take(), "the bundled take").unwrap();
     for tolerance in TOLERANCES {
-        let case = run(&clip, Economy::within(tolerance), 0.0, FRAMES);
+        let case = run(&clip, Economy::within(tolerance), 0.0, ALL_FRAMES);
         assert_kept(&case);
         assert!(case.worst() > 0.0, "nothing was left out");
+        // The take shakes the head and has a gust: that is foreseen, so the bound means something.
+        let in_storm = case.frames.iter().filter(|frame| frame.report.is_storm);
+        let (count, bound) = in_storm.fold((0, 0.0f64), |(count, bound), frame| {
+            (count + 1, bound.max(frame.report.bound))
+        });
+        assert!(
+            count > 50 && bound < 0.3,
+            "{count} frames in a storm, bound {bound}"
+        );
     }
+}
+
+#[test]
+fn a_face_that_is_all_in_motion_keeps_to_the_tolerance() {
+    let clip = active_take(&rig().shape_names, 3.0).unwrap();
+    let case = run(&clip, Economy::within(TOLERANCES[0]), 0.0, 180);
+    assert_kept(&case);
+}
+
+#[test]
+fn what_nobody_foresees_keeps_to_its_bound() {
+    // The same take, frame by frame from outside: nothing says that a storm comes.
+    let clip = parse_keys(demo_take(), "the bundled take").unwrap();
+    let of = |economy: Economy| {
+        let scene = Scene {
+            economy,
+            ..Scene::default()
+        };
+        let mut simulation = Simulation::new(Arc::clone(rig()), scene, Some(clip.clone())).unwrap();
+        simulation.start_at(8.5).unwrap();
+        simulation
+    };
+    let (mut full, mut live) = (of(Economy::OFF), of(Economy::default()));
+    let (mut storms, mut spared) = (0, 0);
+    for frame in 0..150 {
+        let pose = live.pose_at(live.time() + 1.0 / FPS);
+        let report = live.advance_to(pose, 1.0 / FPS).unwrap().economy;
+        full.advance(1.0 / FPS).unwrap();
+        storms += u32::from(report.is_storm);
+        spared += u32::from(!report.is_whole);
+        for patch in 0..rig().patches.len() {
+            let nodes = full
+                .patch_positions(patch)
+                .iter()
+                .zip(live.patch_positions(patch));
+            let sum: f64 = nodes.map(|(p, q)| f64::from((p - q).norm_squared())).sum();
+            let off = (sum / full.patch_positions(patch).len() as f64).sqrt();
+            assert!(off <= report.bound + 2e-4, "frame {frame}: off by {off}");
+        }
+    }
+    assert!(storms > 20 && spared > 20, "{storms} {spared}");
 }
 
 #[test]

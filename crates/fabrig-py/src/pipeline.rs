@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use fabrig_core::anatomy::Resolution;
 use fabrig_core::atomic_file::write_atomically;
 use fabrig_core::facs::{ARKIT_SHAPES, ShapeMatch, match_shape, nearest_name};
 use fabrig_core::mesh::Mesh;
 use fabrig_core::motion::ReadOptions;
 use fabrig_core::pipeline::{
-    AnimateOptions, ExpressionScan, OwnShapes, RigFaceOptions, load_faces, read_own_shapes,
-    rig_face,
+    AnimateOptions, ExpressionScan, OwnShapes, PatchDetail, RigFaceOptions, load_faces,
+    read_own_shapes, rig_face,
 };
 use fabrig_core::recording::RecordedKind;
 use fabrig_core::rig::{Expression, SkinRefinement};
@@ -51,7 +50,9 @@ use crate::template::template_of;
 ///   "transfer" (deformation transfer)
 /// - `jaw`: how it opens, about its "hinge" or on a "linear" way, as in the paper
 /// - `resolution`: of the patches: "coarse" 2,010 nodes, "standard" 19,380, "fine" 50,080,
-///   "finest" 200,320; all but the standard one fit the skin's weights anew, which takes a while
+///   "finest" 200,320; or the fewest that are within an accuracy such as "0.3mm" of the finest, or
+///   within half a pixel of it where the face is so high in the picture, such as "900px"; all but
+///   the standard one fit the skin's weights anew, which takes a while
 /// - `refine_skin`: the mesh is parted over forehead and eyes until its edges are no longer than
 ///   this, in millimetres, so that it can hold wrinkles; new vertices follow those given
 /// - `template`: a `Template`, or the folder of one, instead of the bundled one
@@ -123,7 +124,10 @@ pub(crate) fn rig(
     options.rig.alpha = one_of("alpha", alpha, &ALPHA_MODES)?;
     options.rig.offsets = one_of("offsets", offsets, &OFFSET_MODES)?;
     options.rig.jaw_mode = one_of("jaw", jaw, &JAW_MODES)?;
-    options.rig.resolution = one_of("resolution", resolution, &RESOLUTIONS)?;
+    let detail = resolution
+        .parse::<PatchDetail>()
+        .map_err(|error| input(format!("resolution: {error}")))?;
+    options.rig.resolution = detail.resolution();
     options.refinement = refine_skin.map(SkinRefinement::to);
     let template = template_of(template)?;
     if let Some(expressions) = expressions {
@@ -206,13 +210,6 @@ const OFFSET_MODES: [(&str, OffsetMode); 3] = [
 ];
 
 const JAW_MODES: [(&str, JawMode); 2] = [("hinge", JawMode::Hinge), ("linear", JawMode::Linear)];
-
-const RESOLUTIONS: [(&str, Resolution); 4] = [
-    ("coarse", Resolution::COARSE),
-    ("standard", Resolution::STANDARD),
-    ("fine", Resolution::FINE),
-    ("finest", Resolution::FINEST),
-];
 
 /// The value that a name stands for.
 pub(crate) fn one_of<T: Copy>(argument: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {

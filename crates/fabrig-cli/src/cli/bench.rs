@@ -27,6 +27,8 @@ pub(crate) enum BenchCommand {
     Pareto(BenchParetoArgs),
     /// Faces times takes with one worker and with two: time, throughput, equal bytes
     Batch(BenchBatchArgs),
+    /// What fewer nodes a patch cost, in millimetres of the skin and in time
+    Resolution(BenchResolutionArgs),
     /// What a frame costs: faces simple and complex, with and without skin and recording, and
     /// cloth from 2,000 to 200,000 nodes
     Runtime(BenchRuntimeArgs),
@@ -40,6 +42,16 @@ pub(crate) enum BenchCommand {
     SoftTissue(BenchSoftTissueArgs),
     /// How near rigs come to faces' own expressions, beside whole-face delta transfer
     Table3(BenchTable3Args),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchResolutionArgs {
+    /// Frames of the bundled take, at most
+    #[arg(long, value_name = "N", default_value_t = 360)]
+    pub(crate) frames: usize,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -99,6 +111,9 @@ pub(crate) struct BenchEconomyArgs {
     /// Frames of a take, at most
     #[arg(long, value_name = "N", default_value_t = 720)]
     pub(crate) frames: usize,
+    /// How often a take is run, for the shortest time of each frame
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub(crate) repeats: usize,
     /// Print as JSON
     #[arg(long)]
     pub(crate) json: bool,

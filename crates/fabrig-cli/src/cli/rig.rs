@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use fabrig_core::evaluation::{CheckGates, GATES};
+use fabrig_core::pipeline::PatchDetail;
 use fabrig_core::transfer::{AlphaMode, OffsetMode};
 
 /// Length of one unit of a mesh.
@@ -89,6 +90,11 @@ pub(crate) struct RigArgs {
     /// How the template's displacements are put on the face [default: the best on other faces]
     #[arg(long, value_enum, value_name = "MODE")]
     pub(crate) offsets: Option<Offsets>,
+    /// How many nodes the patches have: coarse, standard, fine or finest; or the fewest that are
+    /// within an accuracy such as 0.3mm of the finest, or within half a pixel of it where the face
+    /// is so high in the picture, such as 900px [default: standard]
+    #[arg(long, value_name = "NAME|MM|PX")]
+    pub(crate) resolution: Option<PatchDetail>,
     /// Part the mesh over forehead and eyes until its edges are no longer than this, so that it
     /// can hold wrinkles (1.5 does); what is new follows the mesh's vertices
     #[arg(long, value_name = "MM", value_parser = clap::value_parser!(f64))]

@@ -43,6 +43,7 @@ pub(crate) fn run(console: &Console, args: &RigArgs) -> Result<Outcome> {
         options.rig.offsets = offsets.into();
     }
     options.rig.alpha = args.alpha.into();
+    options.rig.resolution = args.resolution.unwrap_or_default().resolution();
     options.refinement = args.refine_skin.map(SkinRefinement::to);
     let own = match &args.shapes {
         Some(source) => Some(read_own_shapes(source, &face, &template)?),

@@ -28,6 +28,7 @@ mod frames;
 mod live;
 mod own_shapes;
 mod own_template;
+mod patch_detail;
 mod rig_face;
 mod runtime;
 mod stage;
@@ -45,6 +46,7 @@ pub use expression_scans::{ExpressionScan, ScanReport};
 pub use live::LiveFace;
 pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shapes};
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
+pub use patch_detail::{PatchDetail, PatchDetailError, ResolutionRow, resolution_rows};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
 pub use runtime::{FaceRow, RuntimeProgress, RuntimeReport, SizeRow, runtime};
 pub use stage::{

@@ -23,7 +23,8 @@ pub use bench_face::{all_frames, face_bench_scene, liveliest_frames};
 pub use chain_loss::{LossFigures, ShapeLoss, chain_loss, contour_vertices, hold_pose, shape_loss};
 pub use description::{Dynamics, EyeSource, Scene};
 pub use economy::{
-    Economy, EconomyCase, EconomyFrame, EconomyReport, Tolerance, economy_case, random_economy_case,
+    Economy, EconomyCase, EconomyFrame, EconomyReport, Tolerance, active_take, economy_case,
+    random_economy_case,
 };
 pub use error::{Hint, SceneError, TextPlace};
 pub use face_cases::face_cases;

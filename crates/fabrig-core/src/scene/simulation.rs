@@ -267,8 +267,9 @@ impl Simulation {
     /// [`SceneError`] for a time step that is not positive; the face is then unchanged.
     pub fn advance(&mut self, dt: f64) -> Result<FrameReport, SceneError> {
         check_dt(dt)?;
+        self.look_ahead(dt);
         let pose = self.pose_at(self.time + dt);
-        self.advance_to(pose, dt)
+        self.take_frame(pose, dt)
     }
 
     /// Goes `dt` seconds on to a pose that the caller gives: for live input.
@@ -279,6 +280,13 @@ impl Simulation {
     /// rig; the face is then unchanged.
     pub fn advance_to(&mut self, pose: FacePose, dt: f64) -> Result<FrameReport, SceneError> {
         check_dt(dt)?;
+        if let Some(thrift) = &mut self.thrift {
+            thrift.forget_ahead();
+        }
+        self.take_frame(pose, dt)
+    }
+
+    fn take_frame(&mut self, pose: FacePose, dt: f64) -> Result<FrameReport, SceneError> {
         let mut report = FrameReport::default();
         let clock = Instant::now();
         self.evaluate(pose)?;
@@ -530,10 +538,7 @@ impl Simulation {
                 self.rig.targets(at, &mut self.evaluated)?;
             }
         }
-        self.world = match self.scene.place.to_world() {
-            Some(place) => place * pose.head,
-            None => pose.head,
-        };
+        self.world = self.world_of(&pose);
         self.pose = pose;
         let evaluated = self.targets.iter_mut().zip(&mut self.evaluated);
         for ((target, (positions, velocities)), &moves) in evaluated.zip(&self.has_moved) {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use fabrig_core::motion::{self, ReadOptions, parse_keys};
 use fabrig_core::rig::Rig;
 use fabrig_core::scene::{
-    Economy, EconomyCase, EconomyFrame, Scene, economy_case, random_economy_case,
+    Economy, EconomyCase, EconomyFrame, Scene, active_take, economy_case, random_economy_case,
 };
 use serde_json::json;
 
@@ -28,6 +28,9 @@ const UPPER_HALF: &str = "fabrig-keys 1
 6.0 end
 ";
 
+/// Length of the take in which all of the face moves. (s)
+const ACTIVE: f64 = 6.0;
+
 /// (mm)
 const TOLERANCES: [f64; 3] = [0.05, 0.1, 0.2];
 
@@ -38,6 +41,10 @@ pub(crate) fn run(console: &Console, args: &BenchEconomyArgs) -> Result<Outcome>
         (
             "a still lower half".to_owned(),
             parse_keys(UPPER_HALF, "a still lower half")?,
+        ),
+        (
+            "all shapes all the time".to_owned(),
+            active_take(&rig.shape_names, ACTIVE)?,
         ),
     ];
     if let Some(path) = &args.motion {
@@ -57,7 +64,16 @@ pub(crate) fn run(console: &Console, args: &BenchEconomyArgs) -> Result<Outcome>
             for tolerance in TOLERANCES {
                 let economy = Economy::within(tolerance);
                 let of = (&scene, clip);
-                cases.push(economy_case(name, &rig, of, economy, [0.0, dt], frames)?);
+                let start = [0.0, dt];
+                cases.push(economy_case(
+                    name,
+                    &rig,
+                    of,
+                    economy,
+                    start,
+                    frames,
+                    args.repeats,
+                )?);
                 if show(&cases).is_break() {
                     break 'measuring;
                 }

@@ -7,6 +7,7 @@ mod economy;
 mod pareto;
 mod plot;
 mod registration;
+mod resolution;
 mod runtime;
 mod soft_tissue;
 mod stability;
@@ -27,6 +28,7 @@ pub(crate) fn run(console: &Console, command: &BenchCommand) -> Result<Outcome> 
         BenchCommand::Batch(args) => batch::run(console, args),
         BenchCommand::Economy(args) => economy::run(console, args),
         BenchCommand::Pareto(args) => pareto::run(console, args),
+        BenchCommand::Resolution(args) => resolution::run(console, args),
         BenchCommand::Runtime(args) => runtime::run(console, args),
         BenchCommand::Stability(args) => stability::run(console, args),
         BenchCommand::SoftTissue(args) => soft_tissue::run(console, args),

@@ -11,7 +11,7 @@ const REACH: f64 = 200.0;
 /// Accelerations at the end of a frame, as far as thrift cares.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::scene) struct ActingFields {
-    /// Gravity less the acceleration of the head. (mm/s^2)
+    /// Gravity beyond standing gravity, less the acceleration of the head. (mm/s^2)
     uniform: Vector3<f64>,
     /// Bound of what the head's turning adds over the face. (mm/s^2)
     turning: f64,
@@ -38,10 +38,18 @@ impl ActingFields {
         let pressure = 0.5 * options.air_density * wind.norm();
         let per_speed = pressure * (options.drag + options.lift) / options.areal_density;
         Self {
-            uniform: gravity - linear,
+            uniform: gravity - options.standing_gravity.cast() - linear,
             turning: REACH * (w.norm_squared() + dw.norm()),
             air: wind * per_speed,
         }
+    }
+
+    /// At a place of a head that moves so. (mm/s^2)
+    ///
+    /// - `place`: from the head's origin (mm)
+    pub(in crate::scene) fn at(&self, place: &Vector, head: &HeadMotion) -> Vector {
+        let [w, dw] = [head.angular_velocity, head.angular_acceleration].map(|v| v.cast::<f64>());
+        self.uniform - dw.cross(place) - w.cross(&w.cross(place))
     }
 
     /// Bound of how much the acceleration of any node differs. (mm/s^2)
@@ -52,7 +60,7 @@ impl ActingFields {
     }
 
     /// What the wind does. (mm/s^2)
-    pub(super) fn air(&self) -> f64 {
+    pub(in crate::scene) fn air(&self) -> f64 {
         self.air.norm()
     }
 }

@@ -5,11 +5,13 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use super::fields::ActingFields;
+use super::foresight::{Foresight, Omen};
 use super::options::Economy;
 use super::patch::{Frugal, Present};
 use super::ways::{ties, ways_of_shapes};
 use super::{
-    CALM, MEMORY, SKIN_SHARE, SLEEP_SHARE, SNAP, STILL_SHARE, STORM, SUBSTEP_ERROR, SUBSTEP_SHARE,
+    AHEAD, CALM, GROWTH, MEMORY, ROUNDING, SKIN_SHARE, SLEEP_SHARE, SNAP, STILL_SHARE, STORM,
+    SUBSTEP_ERROR, SUBSTEP_SHARE,
 };
 use crate::cloth::{ClothOptions, ClothPatch, Energies, Integrator, Material, Mode};
 use crate::rig::Rig;
@@ -32,6 +34,7 @@ pub(in crate::scene) struct Thrift {
     /// (mm)
     tolerance: f64,
     patches: Vec<Frugal>,
+    foresight: Foresight,
     /// Place in the cloth of each.
     cloth_of: Vec<Option<usize>>,
     /// Whether what sparing substeps costs was measured for such a cloth.
@@ -81,6 +84,11 @@ impl Thrift {
         let shapes = ways_of_shapes(rig, anchored)?;
         let count = rig.shape_names.len();
         let frequency = |patch: &ClothPatch| TAU * patch.material.magnet_frequency_hz;
+        let materials: Vec<_> = patches
+            .iter()
+            .zip(&cloth_of)
+            .map(|(patch, own)| own.map(|_| patch.material))
+            .collect();
         let tied = ties(rig).into_iter().zip(shapes).zip(patches);
         Ok(Self {
             options: economy,
@@ -96,6 +104,7 @@ impl Thrift {
                     Frugal::new(shapes, ties, &patch.material, nodes, count, softest)
                 })
                 .collect(),
+            foresight: Foresight::new(&materials, count),
             cloth_of,
             is_measured: is_measured(patches, options),
             clock: 0.0,
@@ -113,11 +122,38 @@ impl Thrift {
         for patch in &mut self.patches {
             patch.reset();
         }
+        self.foresight.forget();
         self.clock = 0.0;
         self.whole = CALM;
         self.fields = None;
         self.substeps = options.substeps;
         self.remembered = [0.0; 3];
+    }
+
+    /// When to look next at what comes, before the frame of `dt` seconds that starts at `start`;
+    /// none once all of it was seen.
+    ///
+    /// - `rates`: of the weights at the start (1/s)
+    pub(in crate::scene) fn looks_ahead(
+        &mut self,
+        start: f64,
+        rates: &[f32],
+        dt: f64,
+    ) -> Option<f64> {
+        self.foresight.next([start, start + dt + AHEAD], rates, dt)
+    }
+
+    /// Sees what comes `ahead` seconds after the start of the frame.
+    pub(in crate::scene) fn see(&mut self, [start, time]: [f64; 2], omen: &Omen<'_>, dt: f64) {
+        let is_storm = self.foresight.see(time, omen, dt, &self.patches) || omen.air > STORM_AIR;
+        if is_storm {
+            self.whole = self.whole.max(time - start);
+        }
+    }
+
+    /// What comes is not known any more: somebody else drives the face.
+    pub(in crate::scene) fn forget_ahead(&mut self) {
+        self.foresight.forget();
     }
 
     /// Patches whose muscle shapes are to be evaluated for `pose`.
@@ -197,7 +233,12 @@ impl Thrift {
             sparing(substeps) / reach.max(f64::MIN_POSITIVE),
         );
         let estimate = slept + spared;
-        let snap = if estimate > 0.0 { SNAP * lively } else { 0.0 };
+        let snap = if estimate > 0.0 {
+            let grown = GROWTH * (estimate + ROUNDING);
+            grown.min(SNAP * lively)
+        } else {
+            0.0
+        };
         self.whole = if is_storm { CALM } else { self.whole - now.dt };
         for p in 0..self.patches.len() {
             let sleeps = self.cloth_of[p].is_some_and(|own| asleep[own]);

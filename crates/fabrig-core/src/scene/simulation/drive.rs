@@ -97,7 +97,22 @@ impl Simulation {
     /// Gravity and all that accelerates the face from outside at a time, in the head frame.
     /// (mm/s^2)
     pub(super) fn acceleration(&self, time: f64) -> Vector {
-        let at = self.world * self.middle;
-        self.world.rotation.inverse() * self.fields.acceleration(&at, time, &self.world)
+        self.acceleration_in(&self.world, time)
+    }
+
+    /// The same, where the head is elsewhere.
+    ///
+    /// - `world`: from the head frame to the world (mm)
+    pub(super) fn acceleration_in(&self, world: &Isometry3<f64>, time: f64) -> Vector {
+        let at = world * self.middle;
+        world.rotation.inverse() * self.fields.acceleration(&at, time, world)
+    }
+
+    /// From the head frame to the world, with where the face stands in it. (mm)
+    pub(super) fn world_of(&self, pose: &FacePose) -> Isometry3<f64> {
+        match self.scene.place.to_world() {
+            Some(place) => place * pose.head,
+            None => pose.head,
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::Vector;
 use crate::cloth::StepReport;
-use crate::scene::economy::{ActingFields, EconomyReport, Plan, Present};
+use crate::scene::economy::{ActingFields, EconomyReport, Omen, Plan, Present};
 
 impl Simulation {
     /// Does something during which everything is modelled, whatever the scene's economy.
@@ -15,6 +15,28 @@ impl Simulation {
         self.skin_slack = slack;
         self.forget_frames();
         done
+    }
+
+    /// Lets thrift see what the take does after the frame of `dt` seconds that comes.
+    pub(super) fn look_ahead(&mut self, dt: f64) {
+        let Some(mut thrift) = self.thrift.take() else {
+            return;
+        };
+        let start = self.time;
+        while let Some(time) = thrift.looks_ahead(start, &self.pose.rates, dt) {
+            let pose = self.pose_at(time);
+            let gravity = self.acceleration_in(&self.world_of(&pose), time);
+            let wind = pose.head.rotation.inverse() * pose.wind;
+            let head = &pose.head_motion;
+            let fields = ActingFields::new(gravity, wind, head, &self.scene.cloth);
+            let omen = Omen {
+                rates: &pose.rates,
+                acceleration: fields.at(&self.middle.coords, head),
+                air: fields.air(),
+            };
+            thrift.see([start, time], &omen, dt);
+        }
+        self.thrift = Some(thrift);
     }
 
     /// Decides what the frame is spared that leads to the present pose.
