@@ -24,8 +24,16 @@ const FLAT: f32 = 0.64;
 const WAY_PER_RADIAN: f32 = 0.85;
 /// A slab this much wider than needed makes any length superfluous. (mm)
 const AMPLE: f32 = 0.3;
+/// Lists go at first up to this beyond the thickness, and then between these bounds: those that
+/// have few candidates further, those that have many less far. (mm)
+const LIST_REACH: f32 = 0.5;
+const REACHES: [f32; 2] = [0.5, 2.5];
+/// What few and many are.
+const FEW_AND_MANY: [usize; 2] = [4, 60];
+/// What a wish changes by from list to list.
+const REACH_STEP: f32 = 1.6;
 /// What stored positions and their differences may be off by. (mm)
-const ROUNDING: f32 = 1e-4;
+pub(super) const ROUNDING: f32 = 1e-4;
 
 /// A pair of elements that may collide.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +44,9 @@ pub(crate) struct Candidate {
     pub(crate) gap: f32,
     /// Distance to keep. (mm)
     pub(crate) thickness: f32,
+    /// Unit direction from the second element to the first where they were nearest when they
+    /// were last looked at; zero where they touched.
+    pub(crate) normal: [f32; 3],
 }
 
 /// Two tiles that may meet, of two parts or of one.
@@ -58,6 +69,8 @@ pub(crate) struct TilePair {
     /// that pass. (mm)
     stamp: u64,
     pass: f32,
+    /// Up to which gap the next list shall go. (mm)
+    pub(crate) wish: f32,
     /// When parts were looked at last before a certificate was found.
     pub(crate) round: u32,
 }
@@ -74,6 +87,7 @@ impl TilePair {
             candidates: Vec::new(),
             stamp: 0,
             pass: 0.0,
+            wish: LIST_REACH,
             round: 0,
         }
     }
@@ -128,8 +142,19 @@ impl TilePair {
         self.reach = reach;
         self.spent = way.longest() + ROUNDING;
         (self.stamp, self.pass) = (stamp, pass + ROUNDING);
-        let nearest = self.candidates.iter().map(|c| c.gap).fold(reach, least);
-        self.length = nearest - self.spent;
+        let count = self.candidates.len();
+        if count <= FEW_AND_MANY[0] {
+            self.wish = least(self.wish * REACH_STEP, REACHES[1]);
+        } else if count > FEW_AND_MANY[1] {
+            self.wish = most(self.wish / REACH_STEP, REACHES[0]);
+        }
+        self.length = f32::NEG_INFINITY;
+        self.know_nearest(self.candidates.iter().map(|c| c.gap).fold(reach, least));
+    }
+
+    /// Says what gap no candidate of the list is below. (mm)
+    pub(crate) fn know_nearest(&mut self, gap: f32) {
+        self.length = most(self.length, least(gap, self.reach) - self.spent);
     }
 
     /// What a distance that is known where the tiles are now is more than one that was known when

@@ -1,26 +1,25 @@
 //! Contacts to be: elements that may come nearer than they should on the way to where they are
 //! wanted.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::certificate::{Candidate, TilePair, flat_way, slab};
 use super::contact::Contact;
 use super::detect::{GUARD_THICKNESS, MARGIN, PairList};
 use super::distance::{PairKind, closest_weights, weighted, wide};
 use super::judge::Side;
+use super::plane::{approach, are_apart, direction, is_beyond, parted};
 use super::project::Active;
 use super::tile::{Extent, Way, least, most};
 use crate::Vector;
 
-/// Candidates are listed up to this beyond their thickness. (mm)
-const LIST_REACH: f64 = 0.5;
 /// A slab this much wider than the thickness needs no wider one. (mm)
 const WIDE_ENOUGH: f32 = 1.0;
 /// Share of the distance at rest that is kept, where that is less than the thickness.
 const REST_SHARE: f64 = 0.5;
 /// Candidates of a list looked at in one pass, and how far the tiles have gone since it was
 /// made (mm), after which it is made anew.
-const MOST_LOOKED_AT: usize = 24;
+const MOST_LOOKED_AT: usize = 96;
 const FAR_GONE: f32 = 0.15;
 /// Cells of two tiles of a grid.
 const MOST_NORMALS: usize = 32;
@@ -36,21 +35,32 @@ impl Contact {
         self.actives.clear();
         let mut lists = std::mem::take(&mut self.lists);
         for list in &mut lists {
-            let gone = self.watch.gone[list.a] + self.watch.gone[list.b];
-            if list.collider.is_none() && gone - list.gone < list.left {
+            if list.pairs.is_empty() {
+                continue;
+            }
+            let [a, b] = [list.a, list.b].map(|p| &self.watch.steps[p]);
+            list.gone += f64::from(a.against(b).longest());
+            let gone = list.gone;
+            if list.collider.is_none() && list.first_due > gone {
                 continue;
             }
             let mut pairs = std::mem::take(&mut list.pairs);
-            let mut left = f32::INFINITY;
-            for pair in &mut pairs {
+            let mut due = std::mem::take(&mut list.due);
+            let mut first = f64::INFINITY;
+            for (pair, due) in pairs.iter_mut().zip(&mut due) {
+                if *due > gone && list.collider.is_none() {
+                    first = first.min(*due);
+                    continue;
+                }
                 let clearance = pair.clearance(&self.watch.way_of(pair));
-                left = least(left, clearance);
+                *due = gone + f64::from(clearance);
+                first = first.min(*due);
                 if clearance <= 0.0 && !pair.tiles.iter().all(|&t| self.is_pushed[t as usize]) {
                     self.find_touching(list, pair);
                 }
             }
             list.pairs = pairs;
-            (list.left, list.gone) = (f64::from(left), gone);
+            (list.due, list.first_due) = (due, first);
         }
         self.lists = lists;
         self.collect_pushed();
@@ -125,18 +135,20 @@ impl Contact {
         let (since, known) = self.since_and_known(pair);
         let mut looked_at = 0;
         let mut candidates = std::mem::take(&mut pair.candidates);
+        let mut nearest = f32::INFINITY;
         for c in &mut candidates {
-            if c.gap - since > 0.0 {
-                continue;
-            }
-            looked_at += 1;
-            if self.may_close(c, 0.0, known).is_some() {
-                for node in c.nodes {
-                    self.push_node(node);
+            if c.gap <= since {
+                looked_at += 1;
+                if self.may_close(c, 0.0, known).is_some() {
+                    for node in c.nodes {
+                        self.push_node(node);
+                    }
                 }
             }
+            nearest = least(nearest, c.gap);
         }
         pair.candidates = candidates;
+        pair.know_nearest(nearest);
         if looked_at > MOST_LOOKED_AT && since > FAR_GONE {
             // From where the tiles are now, fewer may close.
             self.list_candidates(list, pair);
@@ -217,7 +229,7 @@ impl Contact {
         let is_cloth = list.collider.is_none();
         let is_round = list.collider.is_some_and(|c| self.world[c].shape.is_round);
         let pass = self.way_of_pass(pair);
-        let reach = LIST_REACH.max(f64::from(pass) + 3.0 * MARGIN);
+        let reach = f64::from(pair.wish).max(f64::from(pass) + 3.0 * MARGIN);
         let pass = (self.watch.stamp, pass);
         let longest = self.thickest(list) + reach;
         let at = |n: u32| {
@@ -229,16 +241,17 @@ impl Contact {
             nodes.iter().for_each(|&n| out.take(&at(n)));
             out
         };
-        let mut offer = |kind: PairKind, nodes: [u32; 4]| {
+        let mut offer = |kind: PairKind, nodes: [u32; 4], normals: [&Vector3<f32>; 2]| {
             let (first, second) = nodes.split_at(kind.first_count());
-            if !around(first).is_near(&around(second), longest as f32) {
+            if is_beyond(kind, &nodes, normals, longest as f32, &self.positions) {
                 return;
             }
             if own && self.rules.side(part_a, first, second) != Side::Apart {
                 return;
             }
             let x = nodes.map(|n| wide(&self.positions[n as usize]));
-            let distance = weighted(&closest_weights(kind, &x), &x).norm();
+            let r = weighted(&closest_weights(kind, &x), &x);
+            let distance = r.norm();
             let most = if is_cloth {
                 self.options.thickness
             } else if is_round {
@@ -249,8 +262,9 @@ impl Contact {
             if distance > most + reach {
                 return;
             }
+            let normal = direction(&r, distance);
             let thickness = if is_cloth {
-                self.at_most_rest(kind, &nodes)
+                self.at_most_rest(kind, &nodes, &normal)
             } else {
                 most
             };
@@ -259,6 +273,7 @@ impl Contact {
                 kind,
                 gap: (distance - thickness) as f32,
                 thickness: thickness as f32,
+                normal,
             });
         };
         let boxes_of = |part: &super::mesh::Part, cells: &[u32]| -> Vec<Extent> {
@@ -284,27 +299,23 @@ impl Contact {
                 }
                 let (ca, cb) = (&part_a.cells[ca as usize], &part_b.cells[cb as usize]);
                 let hulls = [ca.hull.as_slice(), &cb.hull];
-                if are_apart(
-                    hulls,
-                    [&normals_a[i], &normals_b[j]],
-                    longest as f32,
-                    &self.positions,
-                ) {
+                let normals = [&normals_a[i], &normals_b[j]];
+                if are_apart(hulls, normals, longest as f32, &self.positions) {
                     continue;
                 }
                 for &v in &ca.nodes {
                     for &[x, y, z] in &cb.triangles {
-                        offer(PairKind::VertexTriangle, [v, x, y, z]);
+                        offer(PairKind::VertexTriangle, [v, x, y, z], normals);
                     }
                 }
                 for &v in &cb.nodes {
                     for &[x, y, z] in &ca.triangles {
-                        offer(PairKind::VertexTriangle, [v, x, y, z]);
+                        offer(PairKind::VertexTriangle, [v, x, y, z], normals);
                     }
                 }
                 for &[p, q] in &ca.edges {
                     for &[r, s] in &cb.edges {
-                        offer(PairKind::EdgeEdge, [p, q, r, s]);
+                        offer(PairKind::EdgeEdge, [p, q, r, s], normals);
                     }
                 }
             }
@@ -323,7 +334,14 @@ impl Contact {
     }
 
     /// The thickness, or half the distance at rest where that is less. (mm)
-    fn at_most_rest(&self, kind: PairKind, nodes: &[u32; 4]) -> f64 {
+    ///
+    /// - `normal`: unit direction between them now, which mostly shows that they are far enough
+    ///   apart at rest, too
+    fn at_most_rest(&self, kind: PairKind, nodes: &[u32; 4], normal: &[f32; 3]) -> f64 {
+        let [parted, _] = parted(kind, nodes, normal, [&self.rest, &self.rest]);
+        if REST_SHARE * f64::from(parted) > self.options.thickness {
+            return self.options.thickness;
+        }
         let at = nodes.map(|n| wide(&self.rest[n as usize]));
         let rest = weighted(&closest_weights(kind, &at), &at).norm();
         self.options.thickness.min(REST_SHARE * rest)
@@ -336,11 +354,20 @@ impl Contact {
     #[inline]
     fn may_close(&self, c: &mut Candidate, more: f64, known: f32) -> Option<([f64; 4], Vector)> {
         let limit = f64::from(c.thickness) + more;
+        // First by the plane that parted them before: it costs little, and sliding along it
+        // costs nothing.
+        let states = [self.positions.as_slice(), &self.wanted];
+        let [now, ever] = parted(c.kind, &c.nodes, &c.normal, states);
+        c.gap = most(c.gap, now - c.thickness + known);
+        if f64::from(ever) > limit {
+            return None;
+        }
         let at = c.nodes.map(|n| wide(&self.positions[n as usize]));
         let weights = closest_weights(c.kind, &at);
         let r = weighted(&weights, &at);
         let distance = r.norm();
         c.gap = most(c.gap, distance as f32 - c.thickness + known);
+        c.normal = direction(&r, distance);
         let to = c.nodes.map(|n| wide(&self.wanted[n as usize]));
         (distance - approach(c.kind, &at, &to) <= limit).then_some((weights, r))
     }
@@ -351,35 +378,4 @@ impl Contact {
         let known = pair.known(&self.watch.way_until_now(pair));
         (self.since_list(pair), known)
     }
-}
-
-/// Whether everything that two cells own is further apart than `reach`, as their planes show:
-/// layers of tissue lie much nearer to each other than their boxes.
-#[inline]
-fn are_apart(
-    hulls: [&[u32]; 2],
-    normals: [&Vector3<f32>; 2],
-    reach: f32,
-    positions: &[Point3<f32>],
-) -> bool {
-    normals.into_iter().any(|n| {
-        let [(low_a, high_a), (low_b, high_b)] = hulls.map(|hull| {
-            hull.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| {
-                let height = positions[v as usize].coords.dot(n);
-                (least(low, height), most(high, height))
-            })
-        });
-        low_b - high_a > reach || low_a - high_b > reach
-    })
-}
-
-/// How much nearer two elements can come when their nodes go straight from `at` to `to`: what
-/// they move in common does not count. (mm)
-pub(super) fn approach(kind: PairKind, at: &[Vector; 4], to: &[Vector; 4]) -> f64 {
-    let moves: [Vector; 4] = std::array::from_fn(|i| to[i] - at[i]);
-    let mean = (moves[0] + moves[1] + moves[2] + moves[3]) * 0.25;
-    let squared = moves.map(|m| (m - mean).norm_squared());
-    let first = kind.first_count();
-    let largest = |s: &[f64]| s.iter().fold(0.0, |m: f64, &x| m.max(x)).sqrt();
-    largest(&squared[..first]) + largest(&squared[first..])
 }

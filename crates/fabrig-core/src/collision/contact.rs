@@ -7,7 +7,7 @@ use super::mesh::Part;
 use super::project::{Active, SmoothContact};
 use super::rules::Rules;
 use super::sticky::{Bond, Lip};
-use super::tile::Tiles;
+use super::tile::{Extent, Tiles, Way};
 use super::world::WorldCollider;
 use super::{
     Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
@@ -252,6 +252,7 @@ impl Contact {
         let lists = self.lists.iter_mut();
         for list in lists.filter(|list| is_moved(list.collider)) {
             list.pairs.clear();
+            list.look_again();
         }
         for (index, collider) in self.world.iter_mut().enumerate() {
             if is_moved(Some(index)) {
@@ -314,7 +315,7 @@ impl Contact {
         for pass in 0..passes {
             if passes > 1 {
                 // What parts go is measured for the substep, not for each pass.
-                self.lists.iter_mut().for_each(|list| list.left = -1.0);
+                self.lists.iter_mut().for_each(PairList::look_again);
             }
             let left = (passes - pass) as f64;
             let share = 1.0 / left;
@@ -342,13 +343,17 @@ impl Contact {
     /// The longest way of anything in a substep (mm); marks the colliders that are away.
     fn longest_way(&mut self, goal: &[Point3<f32>], progress: [f64; 2]) -> f64 {
         let mut furthest = 0.0_f64;
-        for (part, gone) in self.parts[..self.cloth_parts]
+        for (part, step) in self.parts[..self.cloth_parts]
             .iter()
-            .zip(&mut self.watch.gone)
+            .zip(&mut self.watch.steps)
         {
             let range = part.first as usize..(part.first + part.count) as usize;
-            let way = longest(&goal[range.clone()], &self.positions[range]);
-            *gone += way;
+            let (goal, from) = (&goal[range.clone()], &self.positions[range]);
+            *step = Way::of(&Extent::of_ways(from, goal));
+            let mut way = f64::from(step.longest());
+            if way > PASS_LENGTH {
+                way = longest(goal, from);
+            }
             furthest = furthest.max(way);
         }
         for index in 0..self.world.len() {
@@ -450,17 +455,8 @@ impl SubstepHook for Contact {
     }
 }
 
-/// The longest way from `from` to `to`, or a little more. (mm)
+/// The longest way from `from` to `to`. (mm)
 fn longest(to: &[Point3<f32>], from: &[Point3<f32>]) -> f64 {
-    let [a, b] = [to, from].map(bytemuck::cast_slice::<Point3<f32>, f32>);
-    let largest = a.iter().zip(b).fold(0.0_f32, |m, (a, b)| {
-        let by = (a - b).abs();
-        if by > m { by } else { m }
-    });
-    let most = 3.0_f64.sqrt() * f64::from(largest);
-    if most <= PASS_LENGTH {
-        return most;
-    }
     let squares = to.iter().zip(from).map(|(a, b)| (a - b).norm_squared());
     f64::from(squares.fold(0.0, f32::max)).sqrt()
 }

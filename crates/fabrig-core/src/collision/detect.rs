@@ -35,11 +35,12 @@ pub(crate) struct PairList {
     pub(crate) collider: Option<usize>,
     /// Rising.
     pub(crate) pairs: Vec<TilePair>,
-    /// How far its parts may go, both together, before one of its pairs has to be looked at:
-    /// less than zero, if one has. (mm)
-    pub(super) left: f64,
-    /// How far they had gone when that was found. (mm)
+    /// How far the two parts have gone against each other, substep after substep. (mm)
     pub(super) gone: f64,
+    /// For each pair how far they have gone when it has to be looked at again. (mm)
+    pub(super) due: Vec<f64>,
+    /// The least of these. (mm)
+    pub(super) first_due: f64,
 }
 
 impl PairList {
@@ -50,9 +51,17 @@ impl PairList {
             friction,
             collider,
             pairs: Vec::new(),
-            left: -1.0,
             gone: 0.0,
+            due: Vec::new(),
+            first_due: f64::NEG_INFINITY,
         }
+    }
+
+    /// All pairs have to be looked at.
+    pub(super) fn look_again(&mut self) {
+        self.due.clear();
+        self.due.resize(self.pairs.len(), f64::NEG_INFINITY);
+        self.first_due = f64::NEG_INFINITY;
     }
 }
 
@@ -69,8 +78,8 @@ pub(super) struct Watch {
     /// Boxes that tiles stay in, and parts. (mm)
     boxes: Vec<Extent>,
     part_boxes: Vec<Extent>,
-    /// How far nodes of each part have gone, at most, pass after pass. (mm)
-    pub(super) gone: Vec<f64>,
+    /// Ways of each patch's nodes in this substep. (mm)
+    pub(super) steps: Vec<Way>,
     /// Parts in which something is pushed in this pass.
     pub(super) is_pushed: Vec<bool>,
     /// Whether parts are to be looked at, whatever they do.
@@ -105,7 +114,7 @@ impl Watch {
             rooms: vec![Extent::EMPTY; tile_count],
             boxes: vec![Extent::EMPTY; tile_count],
             part_boxes: vec![Extent::EMPTY; part_count],
-            gone: vec![0.0; part_count],
+            steps: vec![Way::default(); part_count],
             is_pushed: vec![false; part_count],
             is_stale: true,
             ..Self::default()
@@ -118,7 +127,7 @@ impl Contact {
     /// anew where that is too far.
     pub(super) fn refresh_pairs(&mut self) {
         self.watch.stamp += 1;
-        let mut is_stale = self.watch.is_stale || self.watch.repeated > MOST_REPEATED;
+        let mut is_stale = self.watch.is_stale;
         for index in 0..self.parts.len() {
             if self.is_away(index) {
                 continue;
@@ -131,8 +140,8 @@ impl Contact {
                 is_stale |= !watch.rooms[t].holds(&both);
             }
         }
-        if is_stale {
-            self.renew();
+        if is_stale || self.watch.repeated > MOST_REPEATED {
+            self.renew(is_stale);
         }
     }
 
@@ -152,7 +161,7 @@ impl Contact {
             }
         }
         if self.watch.is_stale {
-            self.renew();
+            self.renew(true);
         }
     }
 
@@ -163,9 +172,14 @@ impl Contact {
         if !self.is_any_pushed {
             return;
         }
+        let is_pushed = |t: &u32| self.is_pushed[*t as usize];
         for list in &mut self.lists {
             if watch.is_pushed[list.a] || watch.is_pushed[list.b] {
-                list.left = -1.0;
+                let pairs = list.pairs.iter().zip(&mut list.due);
+                for (_, due) in pairs.filter(|(p, _)| p.tiles.iter().any(is_pushed)) {
+                    *due = f64::NEG_INFINITY;
+                    list.first_due = f64::NEG_INFINITY;
+                }
             }
         }
         for (t, _) in self.is_pushed.iter().enumerate().filter(|(_, p)| **p) {
@@ -189,9 +203,9 @@ impl Contact {
         part >= self.cloth_parts && self.world.iter().any(|c| c.part == Some(part) && c.is_away)
     }
 
-    /// Looks at all parts where they are now.
-    fn renew(&mut self) {
-        self.report.detections += 1;
+    /// Takes where parts are now for what ways count from, and finds anew which tiles may meet
+    /// where `is_whole` or a tile has left its room.
+    fn renew(&mut self, mut is_whole: bool) {
         for (way, now) in self.watch.ways.iter_mut().zip(&self.watch.now) {
             *way = Way::of(now);
         }
@@ -199,6 +213,7 @@ impl Contact {
             for pair in &mut list.pairs {
                 pair.renew(&self.watch.way_of(pair));
             }
+            list.look_again();
         }
         for collider in &mut self.world {
             for (free, (tile, _)) in collider.free.iter_mut().zip(&collider.watched) {
@@ -214,16 +229,32 @@ impl Contact {
             if !is_away {
                 self.measure(index);
             }
-            let mut whole = Extent::EMPTY;
             for t in self.tiles.of_part[index].clone() {
                 let watch = &mut self.watch;
-                watch.now[t] = Extent::STILL;
+                let gone = std::mem::replace(&mut watch.now[t], Extent::STILL);
                 if is_away {
                     watch.next[t] = Extent::STILL;
                 }
-                let next = watch.next[t];
-                watch.ways[t] = Way::of(&watch.now[t].union(&next));
-                let room = room(&next);
+                let both = watch.now[t].union(&watch.next[t]);
+                watch.ways[t] = Way::of(&both);
+                // What is left of it for the node that has gone furthest.
+                watch.rooms[t].shrink(&gone);
+                is_whole |= !is_away && !watch.rooms[t].holds(&both);
+            }
+        }
+        if is_whole {
+            self.find_pairs();
+        }
+    }
+
+    /// Gives every tile new room, and finds the tiles that may meet in it.
+    fn find_pairs(&mut self) {
+        self.report.detections += 1;
+        for index in 0..self.parts.len() {
+            let mut whole = Extent::EMPTY;
+            for t in self.tiles.of_part[index].clone() {
+                let watch = &mut self.watch;
+                let room = room(&watch.next[t]);
                 let mut bounds = self.tiles.tiles[t].bounds(&self.positions);
                 for k in 0..3 {
                     bounds.low[k] += room.low[k];
@@ -242,8 +273,8 @@ impl Contact {
             if !self.is_away(list.b) {
                 self.near_tiles(list, &mut near);
             }
-            list.left = -1.0;
             merge(&mut list.pairs, &near);
+            list.look_again();
         }
         self.lists = lists;
     }

@@ -9,10 +9,10 @@
 //!
 //! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
 
-use super::collect::approach;
 use super::contact::Contact;
 use super::detect::MARGIN;
 use super::distance::{PairKind, closest_weights, weighted, wide};
+use super::plane::approach;
 use super::project::{Active, narrow};
 use crate::Vector;
 

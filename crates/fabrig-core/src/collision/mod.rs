@@ -14,6 +14,7 @@
 //! - `certificate`: what proves from substep to substep that two tiles do not meet
 //! - `collect`: where nothing proves it, the elements that may
 //! - `distance`: vertices and triangles, edges and edges
+//! - `plane`: what planes between them show, before their distance is measured
 //! - `project`: contacts as planes, Coulomb friction; `sticky`: bonds between lips
 //! - `filter`: conservative advancement, the guarantee that nothing crosses
 //! - `collider`, `world`, `cloth_shape`: things of the world; the last one speaks parry
@@ -41,6 +42,7 @@ mod filter;
 mod judge;
 mod mesh;
 mod options;
+mod plane;
 mod project;
 mod report;
 mod rules;

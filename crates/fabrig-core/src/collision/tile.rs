@@ -36,6 +36,33 @@ impl Extent {
         high: [0.0; 3],
     };
 
+    /// The box of the ways of nodes.
+    pub(crate) fn of_ways(from: &[Point3<f32>], to: &[Point3<f32>]) -> Self {
+        let [from, to] = [from, to].map(bytemuck::cast_slice::<Point3<f32>, f32>);
+        // Four nodes beside each other.
+        let (mut lows, mut highs) = ([f32::INFINITY; 12], [f32::NEG_INFINITY; 12]);
+        let mut take = |from: &[f32], to: &[f32]| {
+            let ends = lows.iter_mut().zip(highs.iter_mut());
+            for ((low, high), (from, to)) in ends.zip(from.iter().zip(to)) {
+                let by = to - from;
+                *low = least(*low, by);
+                *high = most(*high, by);
+            }
+        };
+        let (rows_from, rest_from) = from.as_chunks::<12>();
+        let (rows_to, rest_to) = to.as_chunks::<12>();
+        for (from, to) in rows_from.iter().zip(rows_to) {
+            take(from, to);
+        }
+        take(rest_from, rest_to);
+        let mut out = Self::EMPTY;
+        for k in 0..12 {
+            out.low[k % 3] = least(out.low[k % 3], lows[k]);
+            out.high[k % 3] = most(out.high[k % 3], highs[k]);
+        }
+        out
+    }
+
     #[inline]
     pub(crate) fn take(&mut self, p: &[f32; 3]) {
         for k in 0..3 {
@@ -56,6 +83,15 @@ impl Extent {
     #[inline]
     pub(crate) fn holds(&self, other: &Self) -> bool {
         (0..3).all(|k| self.low[k] <= other.low[k] && other.high[k] <= self.high[k])
+    }
+
+    /// Takes off what every way in `gone` has used up.
+    #[inline]
+    pub(crate) fn shrink(&mut self, gone: &Self) {
+        for k in 0..3 {
+            self.low[k] -= gone.low[k];
+            self.high[k] -= gone.high[k];
+        }
     }
 
     /// Whether two boxes come within `reach` of each other.
