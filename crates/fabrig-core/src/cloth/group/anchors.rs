@@ -123,12 +123,13 @@ impl<R: Real> Group<R> {
 
     /// Moves the anchors through a substep.
     ///
-    /// - `step`: Hermite weights, as for the targets, so that equal motion is exactly equal
+    /// - `left`: Hermite weights of what is left of the way to the end of the frame, as for the
+    ///   targets, so that equal motion is exactly equal
     #[inline(always)]
     pub(super) fn move_anchors(&mut self, [chord, start, end]: [R; 3]) {
         for anchor in &mut self.anchors {
             let [c, a, b] = anchor.segment;
-            anchor.now += c * chord + a * start + b * end;
+            anchor.now = anchor.end - (c * chord + a * start + b * end);
         }
     }
 

@@ -73,8 +73,10 @@ struct Prediction<R> {
     /// Added masses that draw to X, and to X + u_b. [mass]
     pull: R,
     follow: R,
-    /// Hermite weights of the target's step now, of its step before where that was in the
-    /// same frame, and of u_b - x_b: the step less what history takes of the one before.
+    /// Hermite weights of what is left of the target's way to the end of the frame, of its step
+    /// now, of its step before where that was in the same frame, and of u_b - x_b: the step less
+    /// what history takes of the one before.
+    left: [R; 3],
     step: [R; 3],
     last_step: [R; 3],
     drift: [R; 3],
@@ -191,6 +193,7 @@ impl<R: Real> Group<R> {
             h_e,
             pull: self.magnet.stiffness * (h_e * h_e) * R::splat(is_folded),
             follow: self.magnet.past_mass(self.mass, h_e),
+            left: difference([self.weights[1], hermite(1.0)]),
             step,
             last_step,
             drift: std::array::from_fn(|k| step[k] - last_step[k] * history),
@@ -297,7 +300,7 @@ impl<R: Real> Group<R> {
         } else {
             self.predict_in::<IS_TURN, _>(&Uniform(Vec3::splat(substep.uniform)), p)
         };
-        self.move_anchors(p.step);
+        self.move_anchors(p.left);
         if self.mode != Mode::Paper {
             self.pull_to_anchors();
         }
@@ -316,7 +319,7 @@ impl<R: Real> Group<R> {
             start_slopes: &self.start_slopes[..n],
             end_slopes: &self.end_slopes[..n],
         };
-        let inv_masses = &self.inv_masses[..n];
+        let (ends, inv_masses) = (&self.ends[..n], &self.inv_masses[..n]);
         let is_damped = self.has_stretch_damping;
         let previous_us = &self.previous_displacements[..n];
         let previous_vs = &self.previous_velocities[..n];
@@ -356,7 +359,9 @@ impl<R: Real> Group<R> {
                 };
                 drift = segments.weighted(i, p.step) - target_steps[i] * p.history;
             }
-            let target = targets[i] + segments.weighted(i, p.step);
+            // From the end of the frame: steps that are summed up would sum up their rounding, and
+            // neighbours that are rounded differently are a strain.
+            let target = ends[i] - segments.weighted(i, p.left);
             // As u + g (u - u'): weights that are rounded to a sum other than 1 would be a force.
             let change = m.u - m.previous_u;
             let ub = m.u + change * p.history;
