@@ -36,6 +36,7 @@ ELSEWHERE = {
     "fabrig bench batch": "eight faces; the crate's own tests make fewer",
 }
 QUICK = {
+    "fabrig bench economy": ["--scenes", "1", "--frames", "30"],
     "fabrig export": ["--without-dynamics", "--skip-check"],
     "fabrig render": ["--size", "64"],
 }
