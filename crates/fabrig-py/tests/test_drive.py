@@ -52,8 +52,12 @@ def test_edits_beside_a_rig_are_applied_when_it_is_loaded(rig, tmp_path):
     assert plain.alphas == rig.alphas
     edited = plain.with_edits(tmp_path / "face.edits.toml")
     assert edited.alphas["malar_fat_l"] == 1.25 and plain.alphas == rig.alphas
-    (tmp_path / "face.edits.toml").write_text("[patches.malar_fat]\nalpha = 1\n")
-    with pytest.raises(fabrig.RigError, match="malar_fat_l|malar_fat_r"):
+    # Without its side a patch stands for both.
+    (tmp_path / "face.edits.toml").write_text("[patches.malar_fat]\nalpha = 1.5\n")
+    both = fabrig.Rig.load(path).alphas
+    assert both == rig.alphas | {"malar_fat_l": 1.5, "malar_fat_r": 1.5}
+    (tmp_path / "face.edits.toml").write_text("[patches.malar_fta_l]\nalpha = 1\n")
+    with pytest.raises(fabrig.RigError, match="malar_fat_l"):
         fabrig.Rig.load(path)
 
 
