@@ -5,6 +5,7 @@ card, or Mesa's software (`mesa-vulkan-drivers`). Without Vulkan there is no pic
 picture's test is skipped with the viewer's own words; FABRIG_NEEDS_PICTURES=1 makes that a failure.
 """
 
+import contextlib
 import os
 import pathlib
 import signal
@@ -109,7 +110,9 @@ def pictures(folder, times):
         assert not reports
         return shots
     finally:
-        os.killpg(viewer.pid, signal.SIGTERM)
+        # It may have left by itself, where it cannot draw.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(viewer.pid, signal.SIGTERM)
         viewer.wait(30)
 
 
