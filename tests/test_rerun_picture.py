@@ -79,7 +79,9 @@ def pictures(folder, times):
         while True:
             if viewer.poll() is not None or time.monotonic() > end:
                 said = log.read_text()
-                if "FABRIG_NEEDS_PICTURES" not in os.environ and "adapter" in said.lower():
+                # Without an adapter, or with OpenGL's software alone.
+                cannot = "adapter" in said.lower() or "Failed to get render context" in said
+                if "FABRIG_NEEDS_PICTURES" not in os.environ and cannot:
                     pytest.skip(f"the viewer cannot draw here: {said[-300:]}")
                 raise AssertionError(said)
             time.sleep(0.5)
