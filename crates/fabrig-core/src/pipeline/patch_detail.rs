@@ -2,8 +2,8 @@
 //!
 //! What each resolution costs was measured against the finest ([`resolution_rows`], which
 //! `fabrig bench resolution` prints): the skin of the bundled face through the expressions of
-//! the bundled take, with everything modelled. Coarser patches are not only coarser curves between the same points, they
-//! are other cloth, so that is not how it was reckoned but how far the skins were apart.
+//! the bundled take, with everything modelled. Coarser patches are not only coarser curves between
+//! the same points, they are other cloth: so the skins were compared, not the curves.
 
 use std::ops::ControlFlow;
 use std::str::FromStr;

@@ -16,8 +16,8 @@ pub(super) struct Anchor<R> {
     indices: Vec<u32>,
     /// k, 0 in lanes without. [mass/s^2]
     pub(super) stiffness: R,
-    /// Position at the end of the substep, or at the start of the frame before there is one, and
-    /// at the end of the frame. [mm, relative to the patch's centre]
+    /// Position at the end of the substep and at the end of the frame. [mm, relative to the
+    /// patch's centre]
     now: Vec3<R>,
     end: Vec3<R>,
     /// Hermite segment of the frame: chord, slopes at the start and at the end. (mm)
@@ -79,7 +79,6 @@ impl<R: Real> Anchor<R> {
         let had_velocity = std::mem::take(&mut self.has_velocity[lane]);
         let index = self.indices[lane] as usize;
         let start = self.end.lane(lane);
-        self.now.set_lane(lane, start);
         let Some(motion) = motion else {
             for part in &mut self.segment {
                 part.set_lane(lane, [0.0; 3]);

@@ -49,8 +49,8 @@
 //!
 //! The same holds in a storm, where snapping is common. So that little is there to be raised, a storm
 //! is foreseen where a take says what comes ([`foresight`]): everything is modelled from [`AHEAD`]
-//! before it, and by then what was left out has died away. What rounding makes of two runs that ever
-//! differed stays, and in a strong gust that alone was seen to grow to 0.054 mm.
+//! before it, and by then nearly all of what was left out has died away: less than 0.0001 mm stays, and
+//! in a strong gust that was seen to grow to 0.054 mm.
 //!
 //! # Skin
 //!
