@@ -94,3 +94,6 @@ pub use linear::{LinearCloth, NodeVectors};
 pub use materials::{Material, MaterialError, Materials, TIME_UNIT};
 pub use report::{Counters, Energies, StepReport};
 pub use solver::Cloth;
+
+pub(crate) use group::vectorized;
+pub(crate) use lanes::{F32x8, Real, Vec3};

@@ -17,11 +17,6 @@ use nalgebra::{Point3, Vector3};
 use super::distance::PairKind;
 use super::tile::{Tile, Way, least, most};
 
-/// Least cosine between the normals of flat tiles and their mean: 50 degrees.
-const FLAT: f32 = 0.64;
-/// What nodes go against each other before a cell of the default resolution has turned by a
-/// radian. (mm)
-const WAY_PER_RADIAN: f32 = 0.85;
 /// A slab this much wider than needed makes any length superfluous. (mm)
 const AMPLE: f32 = 0.3;
 /// Lists go at first up to this beyond the thickness, and then between these bounds: those that
@@ -32,6 +27,8 @@ const REACHES: [f32; 2] = [0.5, 2.5];
 const FEW_AND_MANY: [usize; 2] = [4, 60];
 /// What a wish changes by from list to list.
 const REACH_STEP: f32 = 1.6;
+/// Most nodes of a tile, in two states: 5 x 5 of a grid, 3 of each of 8 triangles of a mesh.
+const MOST_PLACES: usize = 56;
 /// What stored positions and their differences may be off by. (mm)
 pub(super) const ROUNDING: f32 = 1e-4;
 
@@ -40,21 +37,16 @@ pub(super) const ROUNDING: f32 = 1e-4;
 pub(crate) struct Candidate {
     pub(crate) nodes: [u32; 4],
     pub(crate) kind: PairKind,
-    /// Distance when the list was made, beyond the thickness. (mm)
-    pub(crate) gap: f32,
     /// Distance to keep. (mm)
     pub(crate) thickness: f32,
-    /// Unit direction from the second element to the first where they were nearest when they
-    /// were last looked at; zero where they touched.
-    pub(crate) normal: [f32; 3],
 }
 
 /// Two tiles that may meet, of two parts or of one.
 #[derive(Debug, Clone)]
 pub(crate) struct TilePair {
     pub(crate) tiles: [u32; 2],
-    /// Direction of the slab, from the second tile to the first.
-    normal: [f32; 3],
+    /// Direction of the slab, from the second tile to the first; the fourth number is nothing.
+    normal: [f32; 4],
     /// Gap along it at the references beyond the thickness; negative infinity: none known. (mm)
     gap: f32,
     /// How far the tiles may go against each other from the references. (mm)
@@ -64,31 +56,45 @@ pub(crate) struct TilePair {
     spent: f32,
     /// Up to which gap the list holds all candidates; negative: there is no list. (mm)
     pub(crate) reach: f32,
+    /// When parts were looked at last before a certificate was found.
+    pub(crate) round: u32,
+    /// Apart from what every pair is asked for.
+    pub(crate) near: Box<NearElements>,
+}
+
+/// The elements of two tiles that are near each other.
+#[derive(Debug, Clone)]
+pub(crate) struct NearElements {
+    /// Vertices and triangles first.
     pub(crate) candidates: Vec<Candidate>,
+    /// For each candidate a distance beyond its thickness that it had, at least, when the list
+    /// was made: beside each other, as most of them are all that is looked at. (mm)
+    pub(crate) gaps: Vec<f32>,
     /// The moment at which the list was made, and how far the tiles went against each other in
     /// that pass. (mm)
     stamp: u64,
     pass: f32,
     /// Up to which gap the next list shall go. (mm)
     pub(crate) wish: f32,
-    /// When parts were looked at last before a certificate was found.
-    pub(crate) round: u32,
 }
 
 impl TilePair {
     pub(crate) fn new(tiles: [u32; 2]) -> Self {
         Self {
             tiles,
-            normal: [0.0; 3],
+            normal: [0.0; 4],
             gap: f32::NEG_INFINITY,
             length: f32::NEG_INFINITY,
             spent: 0.0,
             reach: -1.0,
-            candidates: Vec::new(),
-            stamp: 0,
-            pass: 0.0,
-            wish: LIST_REACH,
             round: 0,
+            near: Box::new(NearElements {
+                candidates: Vec::new(),
+                gaps: Vec::new(),
+                stamp: 0,
+                pass: 0.0,
+                wish: LIST_REACH,
+            }),
         }
     }
 
@@ -123,10 +129,11 @@ impl TilePair {
     /// - `gap`: along `normal`, beyond the thickness (mm)
     /// - `way`: to where they are
     pub(crate) fn keep_slab(&mut self, normal: Vector3<f32>, gap: f32, way: &Way) {
-        self.normal = normal.into();
+        self.normal = [normal.x, normal.y, normal.z, 0.0];
         self.gap = gap - way.along(&self.normal)[1] - ROUNDING;
         self.reach = -1.0;
-        self.candidates.clear();
+        self.near.candidates.clear();
+        self.near.gaps.clear();
     }
 
     /// Keeps a length found where the tiles are now. (mm)
@@ -141,24 +148,44 @@ impl TilePair {
     pub(crate) fn keep_list(&mut self, reach: f32, way: &Way, (stamp, pass): (u64, f32)) {
         self.reach = reach;
         self.spent = way.longest() + ROUNDING;
-        (self.stamp, self.pass) = (stamp, pass + ROUNDING);
-        let count = self.candidates.len();
+        let near = &mut *self.near;
+        (near.stamp, near.pass) = (stamp, pass + ROUNDING);
+        let count = near.candidates.len();
         if count <= FEW_AND_MANY[0] {
-            self.wish = least(self.wish * REACH_STEP, REACHES[1]);
+            near.wish = least(near.wish * REACH_STEP, REACHES[1]);
         } else if count > FEW_AND_MANY[1] {
-            self.wish = most(self.wish / REACH_STEP, REACHES[0]);
+            near.wish = most(near.wish / REACH_STEP, REACHES[0]);
         }
         self.length = f32::NEG_INFINITY;
-        self.know_nearest(self.candidates.iter().map(|c| c.gap).fold(reach, least));
+        self.know_nearest();
     }
 
-    /// Says what gap no candidate of the list is below. (mm)
-    pub(crate) fn know_nearest(&mut self, gap: f32) {
-        self.length = most(self.length, least(gap, self.reach) - self.spent);
+    /// Takes what no candidate is nearer than as the length that the tiles may go.
+    pub(crate) fn know_nearest(&mut self) {
+        let (rows, rest) = self.near.gaps.as_chunks::<8>();
+        let mut nearest = [self.reach; 8];
+        for row in rows {
+            for (nearest, gap) in nearest.iter_mut().zip(row) {
+                *nearest = least(*nearest, *gap);
+            }
+        }
+        let nearest = nearest.iter().chain(rest).copied().fold(self.reach, least);
+        self.length = most(self.length, nearest - self.spent);
+    }
+
+    /// Puts the places of candidates whose gap is no more than `since` (mm) into `out`, rising.
+    pub(crate) fn nearer_than(&self, since: f32, out: &mut Vec<u32>) {
+        out.clear();
+        for (row, gaps) in self.near.gaps.chunks(8).enumerate() {
+            if gaps.iter().fold(false, |any, gap| any | (*gap <= since)) {
+                let near = gaps.iter().enumerate().filter(|(_, gap)| **gap <= since);
+                out.extend(near.map(|(k, _)| (8 * row + k) as u32));
+            }
+        }
     }
 
     /// What a distance that is known where the tiles are now is more than one that was known when
-    /// the list was made, for [`Candidate::gap`]. (mm)
+    /// the list was made, for [`NearElements::gaps`]. (mm)
     ///
     /// - `way`: to where they are
     #[inline]
@@ -169,8 +196,8 @@ impl TilePair {
     /// How far elements may have gone against each other since the list was made. (mm)
     #[inline]
     pub(crate) fn since_list(&self, way: &Way, stamp: u64) -> f32 {
-        if self.stamp == stamp {
-            return self.pass;
+        if self.near.stamp == stamp {
+            return self.near.pass;
         }
         self.spent + way.longest() + ROUNDING
     }
@@ -189,40 +216,23 @@ pub(crate) fn slab(
     enough: f32,
 ) -> (Vector3<f32>, f32) {
     let mut best = (Vector3::zeros(), f32::NEG_INFINITY);
-    let between = || {
-        let middle = |tile: &Tile| -> Vector3<f32> {
-            let nodes = tile.hull.iter();
-            let sum: Vector3<f32> = nodes.map(|&n| states[0][n as usize].coords).sum();
-            sum / tile.hull.len() as f32
-        };
-        middle(a) - middle(b)
-    };
+    let (a, b) = (Hull::of(a, states), Hull::of(b, states));
+    let between = a.middle - b.middle;
     for k in 0..4 {
         let direction = match k {
             0 => normals[0],
             1 => normals[1],
-            2 => between(),
+            2 => between,
             _ => {
                 // Across the mean normal: tiles side by side in one layer.
                 let n = normals[0] + normals[1];
-                let d = between();
-                d - n * (d.dot(&n) / n.norm_squared().max(f32::MIN_POSITIVE))
+                between - n * (between.dot(&n) / n.norm_squared().max(f32::MIN_POSITIVE))
             }
         };
         let Some(n) = direction.try_normalize(1e-12) else {
             continue;
         };
-        let range = |tile: &Tile| {
-            let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
-            for &node in &tile.hull {
-                for state in states {
-                    let height = n.dot(&state[node as usize].coords);
-                    ends = [least(ends[0], height), most(ends[1], height)];
-                }
-            }
-            ends
-        };
-        let (of_a, of_b) = (range(a), range(b));
+        let (of_a, of_b) = (a.range(&n), b.range(&n));
         for (n, gap) in [(n, of_a[0] - of_b[1]), (-n, of_b[0] - of_a[1])] {
             if gap > best.1 {
                 best = (n, gap);
@@ -235,26 +245,52 @@ pub(crate) fn slab(
     best
 }
 
-/// How far nodes of a sheet with these normals, of any length, may go against each other while
-/// it cannot reach itself; zero where it is not flat. (mm)
-pub(crate) fn flat_way(normals: &[Vector3<f32>]) -> f32 {
-    let sum: Vector3<f32> = normals.iter().sum();
-    let length = sum.norm();
-    let mut cosine = 1.0;
-    for n in normals {
-        let own = n.dot(&sum) / (n.norm() * length);
-        // No number where a cell has no area: it may lie any way.
-        cosine = if own < cosine || own.is_nan() {
-            own
-        } else {
-            cosine
-        };
+/// Nodes of a tile in two states, beside each other.
+struct Hull {
+    places: [[f32; MOST_PLACES]; 3],
+    /// Mean of the nodes in the first state. (mm)
+    middle: Vector3<f32>,
+}
+
+impl Hull {
+    #[inline]
+    fn of(tile: &Tile, states: [&[Point3<f32>]; 2]) -> Self {
+        let origin = states[0][tile.hull[0] as usize].coords;
+        let [x, y, z] = [origin.x, origin.y, origin.z];
+        let mut places = [[x; MOST_PLACES], [y; MOST_PLACES], [z; MOST_PLACES]];
+        let mut sum = Vector3::zeros();
+        for (i, &node) in tile.hull.iter().enumerate() {
+            let now = states[0][node as usize].coords;
+            let next = states[1][node as usize].coords;
+            for k in 0..3 {
+                places[k][2 * i] = now[k];
+                places[k][2 * i + 1] = next[k];
+            }
+            sum += now;
+        }
+        Self {
+            places,
+            middle: sum / tile.hull.len() as f32,
+        }
     }
-    if cosine > FLAT {
-        // What is left to 90 degrees.
-        WAY_PER_RADIAN * cosine.asin()
-    } else {
-        0.0
+
+    /// The least and the most along a direction. (mm)
+    #[inline]
+    fn range(&self, n: &Vector3<f32>) -> [f32; 2] {
+        let (mut low, mut high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        let [x, y, z] = &self.places;
+        for row in (0..MOST_PLACES).step_by(8) {
+            for k in 0..8 {
+                let i = row + k;
+                let height = n.x * x[i] + n.y * y[i] + n.z * z[i];
+                low[k] = least(low[k], height);
+                high[k] = most(high[k], height);
+            }
+        }
+        [
+            low.into_iter().fold(f32::INFINITY, least),
+            high.into_iter().fold(f32::NEG_INFINITY, most),
+        ]
     }
 }
 
@@ -264,6 +300,7 @@ mod tests {
     use crate::anatomy::GridShape;
     use crate::collision::mesh::Part;
     use crate::collision::tile::Tiles;
+    use crate::collision::tile_shape::TileShape;
     use rand::{RngExt, SeedableRng};
 
     /// Two layers that go the same way, turn, and slide along each other.
@@ -287,7 +324,11 @@ mod tests {
         for _ in 0..200 {
             let mut pair = TilePair::new([0, 1]);
             let (mut reference, mut now) = (start.clone(), start.clone());
-            let normals = [(a, 0), (b, 1)].map(|(t, p)| t.normal(&parts[p], &now, |_| {}));
+            let normals = [a, b].map(|tile| {
+                let mut shape = TileShape::UNKNOWN;
+                shape.refresh(1, tile, &now);
+                shape.sum
+            });
             let (normal, gap) = slab([a, b], [&now, &now], normals, 9.0);
             pair.keep_slab(normal, gap, &Way::default());
             let mut step = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0_f32));
@@ -317,14 +358,5 @@ mod tests {
             }
         }
         assert!(kept > 800, "they last: {kept} of 2,400");
-    }
-
-    #[test]
-    fn a_sheet_that_is_bent_double_or_has_no_area_is_not_flat() {
-        let flat = [Vector3::z() * 2.0, Vector3::new(0.1, 0.0, 1.0)];
-        assert!(flat_way(&flat) > 1.0);
-        assert_eq!(flat_way(&[Vector3::z(), Vector3::x() * 3.0]), 0.0);
-        assert_eq!(flat_way(&[Vector3::z(), -Vector3::z()]), 0.0);
-        assert_eq!(flat_way(&[Vector3::z(), Vector3::zeros()]), 0.0);
     }
 }

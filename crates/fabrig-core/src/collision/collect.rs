@@ -1,16 +1,16 @@
 //! Contacts to be: elements that may come nearer than they should on the way to where they are
 //! wanted.
 
-use nalgebra::Vector3;
-
-use super::certificate::{Candidate, TilePair, flat_way, slab};
+use super::certificate::{Candidate, NearElements, ROUNDING, TilePair, slab};
 use super::contact::Contact;
 use super::detect::{GUARD_THICKNESS, MARGIN, PairList};
-use super::distance::{PairKind, closest_weights, weighted, wide};
+use super::distance::{PairKind, closest_weights, places, weighted};
 use super::judge::Side;
-use super::plane::{approach, are_apart, direction, is_beyond, parted};
+use super::parting::Partings;
+use super::plane::{approach, are_apart};
 use super::project::Active;
-use super::tile::{Extent, Way, least, most};
+use super::tile::{Extent, Way, most};
+use super::tile_shape::flat_way;
 use crate::Vector;
 
 /// A slab this much wider than the thickness needs no wider one. (mm)
@@ -19,12 +19,35 @@ const WIDE_ENOUGH: f32 = 1.0;
 const REST_SHARE: f64 = 0.5;
 /// Candidates of a list looked at in one pass, and how far the tiles have gone since it was
 /// made (mm), after which it is made anew.
-const MOST_LOOKED_AT: usize = 96;
+const MOST_LOOKED_AT: usize = 200;
 const FAR_GONE: f32 = 0.15;
-/// Cells of two tiles of a grid.
-const MOST_NORMALS: usize = 32;
 /// What making a list takes, in findings of a certificate.
 const LIST_COST: usize = 25;
+/// In the order that lists have them.
+const KINDS: [PairKind; 2] = [PairKind::VertexTriangle, PairKind::EdgeEdge];
+
+/// Room to look at pairs of elements in, many at a time.
+#[derive(Debug, Default)]
+pub(super) struct Workbench {
+    /// Places of candidates in their list.
+    picked: Vec<u32>,
+    /// Nodes of pairs of one kind, and of the other.
+    nodes: [Vec<[u32; 4]>; 2],
+    /// Edges of a cell with their boxes.
+    ends: Vec<([u32; 2], Extent)>,
+    planes: Partings,
+    /// Those that may close.
+    closing: Vec<Closing>,
+}
+
+/// A candidate that may come too near on the way to where it is wanted.
+#[derive(Debug, Clone, Copy)]
+struct Closing {
+    candidate: Candidate,
+    /// Of the vector between the closest points, and that vector. (mm)
+    weights: [f64; 4],
+    between: Vector,
+}
 
 impl Contact {
     /// Finds elements that may come nearer than their thickness on the way to `wanted`.
@@ -88,22 +111,21 @@ impl Contact {
                 {
                     continue;
                 }
-                let (since, known) = self.since_and_known(pair);
-                for c in &mut pair.candidates {
-                    if c.gap - since > more as f32 {
-                        continue;
-                    }
-                    let Some((weights, r)) = self.may_close(c, more, known) else {
-                        continue;
-                    };
-                    let distance = r.norm();
+                self.find_closing(pair, more);
+                for closing in &self.workbench.closing {
+                    let Candidate {
+                        nodes,
+                        kind,
+                        thickness,
+                    } = closing.candidate;
+                    let distance = closing.between.norm();
                     actives.push(Active {
-                        nodes: c.nodes,
-                        kind: c.kind,
-                        weights,
-                        normal: r / distance.max(1e-12),
+                        nodes,
+                        kind,
+                        weights: closing.weights,
+                        normal: closing.between / distance.max(1e-12),
                         distance,
-                        thickness: f64::from(c.thickness),
+                        thickness: f64::from(thickness),
                         list: index as u32,
                         push: 0.0,
                     });
@@ -132,27 +154,68 @@ impl Contact {
         if !self.has_list(list, pair, 0.0) {
             return;
         }
-        let (since, known) = self.since_and_known(pair);
-        let mut looked_at = 0;
-        let mut candidates = std::mem::take(&mut pair.candidates);
-        let mut nearest = f32::INFINITY;
-        for c in &mut candidates {
-            if c.gap <= since {
-                looked_at += 1;
-                if self.may_close(c, 0.0, known).is_some() {
-                    for node in c.nodes {
-                        self.push_node(node);
-                    }
-                }
-            }
-            nearest = least(nearest, c.gap);
+        let since = self.since_list(pair);
+        let looked_at = self.find_closing(pair, 0.0);
+        let closing = std::mem::take(&mut self.workbench.closing);
+        for node in closing.iter().flat_map(|c| c.candidate.nodes) {
+            self.push_node(node);
         }
-        pair.candidates = candidates;
-        pair.know_nearest(nearest);
+        self.workbench.closing = closing;
+        pair.know_nearest();
         if looked_at > MOST_LOOKED_AT && since > FAR_GONE {
             // From where the tiles are now, fewer may close.
             self.list_candidates(list, pair);
         }
+    }
+
+    /// Finds the candidates of a list that may come within `more` (mm) of their thickness on the
+    /// way to where they are wanted. Returns how many were looked at.
+    fn find_closing(&mut self, pair: &mut TilePair, more: f64) -> usize {
+        let bench = &mut self.workbench;
+        bench.closing.clear();
+        let way = self.watch.way_of(pair);
+        let since = pair.since_list(&way, self.watch.stamp);
+        pair.nearer_than(since + more as f32, &mut bench.picked);
+        if bench.picked.is_empty() {
+            return 0;
+        }
+        let known = pair.known(&self.watch.way_until_now(pair));
+        let (from, to) = (self.positions.as_slice(), self.wanted.as_slice());
+        let NearElements {
+            candidates, gaps, ..
+        } = &mut *pair.near;
+        let second = bench
+            .picked
+            .partition_point(|&k| candidates[k as usize].kind == KINDS[0]);
+        let (of_first, of_second) = bench.picked.split_at(second);
+        for (kind, picked) in KINDS.into_iter().zip([of_first, of_second]) {
+            let nodes = &mut bench.nodes[0];
+            nodes.clear();
+            nodes.extend(picked.iter().map(|&k| candidates[k as usize].nodes));
+            bench.planes.part(kind, nodes, from, Some(to));
+            let planes = bench.planes.now.iter().zip(&bench.planes.ever);
+            for (&k, (&now, &ever)) in picked.iter().zip(planes) {
+                let (c, gap) = (&candidates[k as usize], &mut gaps[k as usize]);
+                *gap = most(*gap, now - c.thickness + known);
+                let limit = f64::from(c.thickness) + more;
+                if f64::from(ever) > limit {
+                    continue;
+                }
+                let at = places(&c.nodes, &self.positions);
+                let weights = closest_weights(kind, &at);
+                let between = weighted(&weights, &at);
+                let distance = between.norm();
+                let to = places(&c.nodes, &self.wanted);
+                if distance - approach(kind, &at, &to) <= limit {
+                    bench.closing.push(Closing {
+                        candidate: *c,
+                        weights,
+                        between,
+                    });
+                }
+            }
+        }
+        bench.picked.len()
     }
 
     /// Whether elements of a pair have to be looked at one by one, with allowance for `more`
@@ -165,25 +228,15 @@ impl Contact {
             self.watch.repeated += 1;
         }
         let own = list.a == list.b;
-        let tiles = pair.tiles.map(|t| &self.tiles.tiles[t as usize]);
-        let mut normals = [Vector3::zeros(); MOST_NORMALS];
-        let mut count = 0;
-        let [a, b] = [(tiles[0], list.a), (tiles[1], list.b)].map(|(tile, part)| {
-            let part = &self.parts[part];
-            tile.normal(part, &self.positions, |n| {
-                if let Some(slot) = normals.get_mut(count) {
-                    *slot = *n;
-                }
-                count += 1;
-            })
-        });
+        self.look_at_tiles(pair);
+        let shapes = pair.tiles.map(|t| &self.shapes[t as usize]);
         if own
             && self
                 .tiles
                 .are_adjacent(&self.parts[list.a], pair.tiles[0], pair.tiles[1])
         {
             // What they go in this pass counts from where they are, too.
-            let way = normals.get(..count).map_or(0.0, flat_way);
+            let way = flat_way(shapes);
             if way > 0.0 && self.way_of_pass(pair) + more < way {
                 pair.keep_length(way, &self.watch.way_until_now(pair));
                 return false;
@@ -191,7 +244,9 @@ impl Contact {
         } else {
             let thickness = self.thickest(list) as f32;
             let states = [self.positions.as_slice(), &self.wanted];
-            let (n, gap) = slab(tiles, states, [a, b], thickness + WIDE_ENOUGH);
+            let tiles = pair.tiles.map(|t| &self.tiles.tiles[t as usize]);
+            let normals = shapes.map(|shape| shape.sum);
+            let (n, gap) = slab(tiles, states, normals, thickness + WIDE_ENOUGH);
             if gap - thickness > more {
                 pair.keep_slab(n, gap - thickness, &self.watch.way_until_now(pair));
                 return false;
@@ -199,6 +254,13 @@ impl Contact {
         }
         self.list_candidates(list, pair);
         true
+    }
+
+    /// Sees how the tiles of a pair lie in this pass.
+    fn look_at_tiles(&mut self, pair: &TilePair) {
+        for t in pair.tiles.map(|t| t as usize) {
+            self.shapes[t].refresh(self.moment, &self.tiles.tiles[t], &self.positions);
+        }
     }
 
     /// How far elements of a pair may have gone against each other since its list was made.
@@ -221,107 +283,141 @@ impl Contact {
         if pair.reach >= 0.0 {
             self.watch.repeated += LIST_COST;
         }
-        let mut candidates = std::mem::take(&mut pair.candidates);
-        candidates.clear();
+        self.look_at_tiles(pair);
+        let mut bench = std::mem::take(&mut self.workbench);
+        let pass = self.way_of_pass(pair);
+        let reach = pair.near.wish.max(pass + 3.0 * MARGIN as f32);
+        let longest = self.thickest(list) as f32 + reach;
+        self.offer_elements(list, pair, longest, &mut bench);
         let own = list.a == list.b;
-        let [part_a, part_b] = [list.a, list.b].map(|p| &self.parts[p]);
-        let [a, b] = pair.tiles.map(|t| &self.tiles.tiles[t as usize]);
         let is_cloth = list.collider.is_none();
         let is_round = list.collider.is_some_and(|c| self.world[c].shape.is_round);
-        let pass = self.way_of_pass(pair);
-        let reach = f64::from(pair.wish).max(f64::from(pass) + 3.0 * MARGIN);
-        let pass = (self.watch.stamp, pass);
-        let longest = self.thickest(list) + reach;
-        let at = |n: u32| {
-            let p = &self.positions[n as usize];
-            [p.x, p.y, p.z]
-        };
-        let around = |nodes: &[u32]| {
-            let mut out = Extent::EMPTY;
-            nodes.iter().for_each(|&n| out.take(&at(n)));
-            out
-        };
-        let mut offer = |kind: PairKind, nodes: [u32; 4], normals: [&Vector3<f32>; 2]| {
-            let (first, second) = nodes.split_at(kind.first_count());
-            if is_beyond(kind, &nodes, normals, longest as f32, &self.positions) {
-                return;
-            }
-            if own && self.rules.side(part_a, first, second) != Side::Apart {
-                return;
-            }
-            let x = nodes.map(|n| wide(&self.positions[n as usize]));
-            let r = weighted(&closest_weights(kind, &x), &x);
-            let distance = r.norm();
-            let most = if is_cloth {
-                self.options.thickness
-            } else if is_round {
-                GUARD_THICKNESS
-            } else {
-                self.covered(&nodes)
-            };
-            if distance > most + reach {
-                return;
-            }
-            let normal = direction(&r, distance);
-            let thickness = if is_cloth {
-                self.at_most_rest(kind, &nodes, &normal)
-            } else {
-                most
-            };
-            candidates.push(Candidate {
-                nodes,
-                kind,
-                gap: (distance - thickness) as f32,
-                thickness: thickness as f32,
-                normal,
-            });
-        };
-        let boxes_of = |part: &super::mesh::Part, cells: &[u32]| -> Vec<Extent> {
-            let cells = cells.iter();
-            cells
-                .map(|&c| around(&part.cells[c as usize].hull))
-                .collect()
-        };
-        let (boxes_a, boxes_b) = (boxes_of(part_a, &a.cells), boxes_of(part_b, &b.cells));
-        let [normals_a, normals_b] = [(a, part_a), (b, part_b)].map(|(tile, part)| {
-            let mut normals = Vec::with_capacity(tile.cells.len());
-            let unit = |n: &Vector3<f32>| n.try_normalize(0.0).unwrap_or_default();
-            tile.normal(part, &self.positions, |n| normals.push(unit(n)));
-            normals
-        });
-        for (i, (&ca, box_a)) in a.cells.iter().zip(&boxes_a).enumerate() {
-            for (j, (&cb, box_b)) in b.cells.iter().zip(&boxes_b).enumerate() {
-                // Of a tile with itself every two cells once.
-                if (own && (part_a.are_next_cells(ca, cb) || a.hull == b.hull && cb < ca))
-                    || !box_a.is_near(box_b, longest as f32)
+        pair.near.candidates.clear();
+        pair.near.gaps.clear();
+        for (k, kind) in KINDS.into_iter().enumerate() {
+            let first_new = pair.near.candidates.len();
+            let planes = &mut bench.planes;
+            planes.part(kind, &bench.nodes[k], &self.positions, None);
+            for (nodes, &now) in bench.nodes[k].iter().zip(&planes.now) {
+                let thickness = if is_cloth {
+                    self.options.thickness
+                } else if is_round {
+                    GUARD_THICKNESS
+                } else if now > longest {
+                    continue;
+                } else {
+                    self.covered(nodes)
+                } as f32;
+                let gap = now - thickness;
+                let (first, second) = nodes.split_at(kind.first_count());
+                if gap > reach
+                    || own && self.rules.side(&self.parts[list.a], first, second) != Side::Apart
                 {
                     continue;
                 }
-                let (ca, cb) = (&part_a.cells[ca as usize], &part_b.cells[cb as usize]);
-                let hulls = [ca.hull.as_slice(), &cb.hull];
-                let normals = [&normals_a[i], &normals_b[j]];
-                if are_apart(hulls, normals, longest as f32, &self.positions) {
+                pair.near.gaps.push(gap);
+                pair.near.candidates.push(Candidate {
+                    nodes: *nodes,
+                    kind,
+                    thickness,
+                });
+            }
+            if is_cloth {
+                let nodes = &mut bench.nodes[k];
+                nodes.clear();
+                nodes.extend(pair.near.candidates[first_new..].iter().map(|c| c.nodes));
+                planes.part(kind, nodes, &self.rest, None);
+                self.keep_at_most_rest(pair, first_new, reach, &planes.now);
+            }
+        }
+        self.workbench = bench;
+        let pass = (self.watch.stamp, pass);
+        pair.keep_list(reach, &self.watch.way_until_now(pair), pass);
+    }
+
+    /// Takes half the distance at rest for the thickness of the candidates from `first` on,
+    /// where that is less, and drops those that are then further than `reach` from it.
+    ///
+    /// - `rest`: how far each of them is apart at rest (mm)
+    fn keep_at_most_rest(&self, pair: &mut TilePair, first: usize, reach: f32, rest: &[f32]) {
+        let mut kept = first;
+        for (k, rest) in (first..).zip(rest) {
+            let mut candidate = pair.near.candidates[k];
+            let at_rest = REST_SHARE * f64::from(most(rest + ROUNDING, 0.0));
+            let thickness = self.options.thickness.min(at_rest) as f32;
+            let gap = pair.near.gaps[k] + (candidate.thickness - thickness);
+            candidate.thickness = thickness;
+            if gap <= reach {
+                pair.near.candidates[kept] = candidate;
+                pair.near.gaps[kept] = gap;
+                kept += 1;
+            }
+        }
+        pair.near.candidates.truncate(kept);
+        pair.near.gaps.truncate(kept);
+    }
+
+    /// Collects the elements of all cells of two tiles that boxes and planes do not show to be
+    /// further apart than `reach`. (mm)
+    fn offer_elements(&self, list: &PairList, pair: &TilePair, reach: f32, bench: &mut Workbench) {
+        let ends = &mut bench.ends;
+        let [vertices, edges] = &mut bench.nodes;
+        vertices.clear();
+        edges.clear();
+        let own = list.a == list.b;
+        let is_one = pair.tiles[0] == pair.tiles[1];
+        let [part_a, part_b] = [list.a, list.b].map(|p| &self.parts[p]);
+        let [a, b] = pair.tiles.map(|t| &self.tiles.tiles[t as usize]);
+        let [shape_a, shape_b] = pair.tiles.map(|t| &self.shapes[t as usize]);
+        for (i, &ca) in a.cells.iter().enumerate() {
+            let mut near = shape_b.near(&shape_a.bounds(i), reach);
+            while near != 0 {
+                let j = near.trailing_zeros() as usize;
+                near &= near - 1;
+                let cb = b.cells[j];
+                // Of a tile with itself every two cells once.
+                if own && (part_a.are_next_cells(ca, cb) || is_one && cb < ca) {
                     continue;
                 }
-                for &v in &ca.nodes {
-                    for &[x, y, z] in &cb.triangles {
-                        offer(PairKind::VertexTriangle, [v, x, y, z], normals);
+                let normals = [shape_a.normal(i), shape_b.normal(j)];
+                let corners = [&a.corners[i], &b.corners[j]];
+                if are_apart(corners, normals, reach, &self.positions) {
+                    continue;
+                }
+                let [of_a, of_b] = [&part_a.cells[ca as usize], &part_b.cells[cb as usize]];
+                // Of elements those that are near the other cell's box.
+                let (box_a, box_b) = (shape_a.bounds(i), shape_b.bounds(j));
+                for (from, to, around) in [(of_a, of_b, &box_b), (of_b, of_a, &box_a)] {
+                    for &v in &from.nodes {
+                        if around.is_near(&self.box_of([v, v]), reach) {
+                            vertices.extend(to.triangles.iter().map(|&[x, y, z]| [v, x, y, z]));
+                        }
                     }
                 }
-                for &v in &cb.nodes {
-                    for &[x, y, z] in &ca.triangles {
-                        offer(PairKind::VertexTriangle, [v, x, y, z], normals);
-                    }
-                }
-                for &[p, q] in &ca.edges {
-                    for &[r, s] in &cb.edges {
-                        offer(PairKind::EdgeEdge, [p, q, r, s], normals);
+                ends.clear();
+                let of_b = of_b.edges.iter().map(|&edge| (edge, self.box_of(edge)));
+                ends.extend(of_b.filter(|(_, own)| box_a.is_near(own, reach)));
+                for &[p, q] in &of_a.edges {
+                    let own = self.box_of([p, q]);
+                    if box_b.is_near(&own, reach) {
+                        let near = ends.iter().filter(|(_, other)| own.is_near(other, reach));
+                        edges.extend(near.map(|&([r, s], _)| [p, q, r, s]));
                     }
                 }
             }
         }
-        pair.candidates = candidates;
-        pair.keep_list(reach as f32, &self.watch.way_until_now(pair), pass);
+    }
+
+    /// The box of an edge where its nodes are now.
+    #[inline]
+    fn box_of(&self, [p, q]: [u32; 2]) -> Extent {
+        let [p, q] = [self.positions[p as usize], self.positions[q as usize]];
+        let mut out = Extent {
+            low: [p.x, p.y, p.z],
+            high: [p.x, p.y, p.z],
+        };
+        out.take(&[q.x, q.y, q.z]);
+        out
     }
 
     /// What covers the cloth's nodes of a pair with a collider, at least. (mm)
@@ -331,51 +427,5 @@ impl Contact {
             .filter(|&&n| (n as usize) < self.cloth_count)
             .map(|&n| f64::from(self.cover[n as usize]))
             .fold(f64::INFINITY, f64::min)
-    }
-
-    /// The thickness, or half the distance at rest where that is less. (mm)
-    ///
-    /// - `normal`: unit direction between them now, which mostly shows that they are far enough
-    ///   apart at rest, too
-    fn at_most_rest(&self, kind: PairKind, nodes: &[u32; 4], normal: &[f32; 3]) -> f64 {
-        let [parted, _] = parted(kind, nodes, normal, [&self.rest, &self.rest]);
-        if REST_SHARE * f64::from(parted) > self.options.thickness {
-            return self.options.thickness;
-        }
-        let at = nodes.map(|n| wide(&self.rest[n as usize]));
-        let rest = weighted(&closest_weights(kind, &at), &at).norm();
-        self.options.thickness.min(REST_SHARE * rest)
-    }
-
-    /// Weights and vector between the closest points of a candidate, if it may come within
-    /// `more` of its thickness on the way.
-    ///
-    /// - `known`: what a distance that is known now adds to the candidate's gap (mm)
-    #[inline]
-    fn may_close(&self, c: &mut Candidate, more: f64, known: f32) -> Option<([f64; 4], Vector)> {
-        let limit = f64::from(c.thickness) + more;
-        // First by the plane that parted them before: it costs little, and sliding along it
-        // costs nothing.
-        let states = [self.positions.as_slice(), &self.wanted];
-        let [now, ever] = parted(c.kind, &c.nodes, &c.normal, states);
-        c.gap = most(c.gap, now - c.thickness + known);
-        if f64::from(ever) > limit {
-            return None;
-        }
-        let at = c.nodes.map(|n| wide(&self.positions[n as usize]));
-        let weights = closest_weights(c.kind, &at);
-        let r = weighted(&weights, &at);
-        let distance = r.norm();
-        c.gap = most(c.gap, distance as f32 - c.thickness + known);
-        c.normal = direction(&r, distance);
-        let to = c.nodes.map(|n| wide(&self.wanted[n as usize]));
-        (distance - approach(c.kind, &at, &to) <= limit).then_some((weights, r))
-    }
-
-    /// [`Self::since_list`], and what a distance that is known now is more than one that was
-    /// known when the list was made. (mm)
-    fn since_and_known(&self, pair: &TilePair) -> (f32, f32) {
-        let known = pair.known(&self.watch.way_until_now(pair));
-        (self.since_list(pair), known)
     }
 }

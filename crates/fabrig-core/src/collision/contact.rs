@@ -2,12 +2,14 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use super::collect::Workbench;
 use super::detect::{PairList, Watch};
 use super::mesh::Part;
 use super::project::{Active, SmoothContact};
 use super::rules::Rules;
 use super::sticky::{Bond, Lip};
 use super::tile::{Extent, Tiles, Way};
+use super::tile_shape::TileShape;
 use super::world::WorldCollider;
 use super::{
     Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
@@ -88,6 +90,10 @@ pub struct Contact {
     /// Largest cover of each part. (mm)
     pub(super) thickest_cover: Vec<f32>,
     pub(super) tiles: Tiles,
+    /// How tiles lie, as of the passes in which that was asked, and the pass that this is.
+    pub(super) shapes: Vec<TileShape>,
+    pub(super) moment: u64,
+    pub(super) workbench: Workbench,
     pub(super) watch: Watch,
     /// Tiles in which something is pushed in this pass, and whether there are any.
     pub(super) is_pushed: Vec<bool>,
@@ -218,6 +224,9 @@ impl Contact {
             is_pushed: vec![false; tiles.len()],
             is_any_pushed: false,
             altered: Vec::new(),
+            shapes: vec![TileShape::UNKNOWN; tiles.len()],
+            moment: 0,
+            workbench: Workbench::default(),
             tiles,
             stopped: vec![false; cloth_parts],
             parts,
@@ -396,7 +405,7 @@ impl Contact {
         self.report.contacts = self.points.len();
         if progress[1] >= 1.0 {
             let pairs = self.lists.iter().flat_map(|list| &list.pairs);
-            self.report.candidates = pairs.map(|pair| pair.candidates.len()).sum();
+            self.report.candidates = pairs.map(|pair| pair.near.candidates.len()).sum();
         }
     }
 }

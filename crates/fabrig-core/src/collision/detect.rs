@@ -96,14 +96,14 @@ impl Watch {
     /// The way of the first tile of a pair against the second: where they are and are wanted.
     #[inline]
     pub(super) fn way_of(&self, pair: &TilePair) -> Way {
-        let [a, b] = pair.tiles.map(|t| &self.ways[t as usize]);
-        a.against(b)
+        let [a, b] = pair.tiles;
+        self.ways[a as usize].against(&self.ways[b as usize])
     }
 
     /// The same, to where they are alone.
     pub(super) fn way_until_now(&self, pair: &TilePair) -> Way {
-        let [a, b] = pair.tiles.map(|t| Way::of(&self.now[t as usize]));
-        a.against(&b)
+        let [a, b] = pair.tiles;
+        Way::of(&self.now[a as usize]).against(&Way::of(&self.now[b as usize]))
     }
 
     pub(super) fn new(tile_count: usize, part_count: usize) -> Self {

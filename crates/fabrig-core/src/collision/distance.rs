@@ -122,6 +122,18 @@ pub(crate) fn wide(p: &nalgebra::Point3<f32>) -> Vector {
     Vector3::new(f64::from(p.x), f64::from(p.y), f64::from(p.z))
 }
 
+/// Double precision of the places of four nodes.
+#[inline]
+pub(crate) fn places(nodes: &[u32; 4], positions: &[nalgebra::Point3<f32>]) -> [Vector; 4] {
+    let [a, b, c, d] = *nodes;
+    [
+        wide(&positions[a as usize]),
+        wide(&positions[b as usize]),
+        wide(&positions[c as usize]),
+        wide(&positions[d as usize]),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

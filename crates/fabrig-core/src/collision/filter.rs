@@ -11,7 +11,7 @@
 
 use super::contact::Contact;
 use super::detect::MARGIN;
-use super::distance::{PairKind, closest_weights, weighted, wide};
+use super::distance::{PairKind, closest_weights, places, weighted, wide};
 use super::plane::approach;
 use super::project::{Active, narrow};
 use crate::Vector;
@@ -35,6 +35,7 @@ impl Contact {
             self.is_pushed.fill(false);
             self.watch.is_pushed.fill(false);
         }
+        self.moment += 1;
         self.refresh_pairs();
         self.collect_smooth();
         let bonds = std::mem::take(&mut self.bonds);
@@ -224,8 +225,8 @@ impl Contact {
     }
 
     fn is_safe(&self, a: &Active) -> bool {
-        let at = a.nodes.map(|n| wide(&self.positions[n as usize]));
-        let to = a.nodes.map(|n| wide(&self.wanted[n as usize]));
+        let at = places(&a.nodes, &self.positions);
+        let to = places(&a.nodes, &self.wanted);
         stays_beside(a, &to) || stays_apart(a.kind, &at, &to, a.distance)
     }
 }

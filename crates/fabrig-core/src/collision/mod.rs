@@ -10,11 +10,12 @@
 //! ```
 //!
 //! - `rules`: which elements may collide at all
-//! - `tile`, `detect`: pieces of parts, how far they have gone, and which of them may meet
+//! - `tile`, `detect`: pieces of parts, how far they have gone, and which of them may meet;
+//!   `tile_shape`: how their cells lie now
 //! - `certificate`: what proves from substep to substep that two tiles do not meet
 //! - `collect`: where nothing proves it, the elements that may
 //! - `distance`: vertices and triangles, edges and edges
-//! - `plane`: what planes between them show, before their distance is measured
+//! - `plane`, `parting`: what planes between them show, before their distance is measured
 //! - `project`: contacts as planes, Coulomb friction; `sticky`: bonds between lips
 //! - `filter`: conservative advancement, the guarantee that nothing crosses
 //! - `collider`, `world`, `cloth_shape`: things of the world; the last one speaks parry
@@ -42,6 +43,7 @@ mod filter;
 mod judge;
 mod mesh;
 mod options;
+mod parting;
 mod plane;
 mod project;
 mod report;
@@ -50,6 +52,7 @@ mod sheet;
 mod star;
 mod sticky;
 mod tile;
+mod tile_shape;
 mod tree;
 mod world;
 

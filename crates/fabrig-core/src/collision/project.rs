@@ -14,7 +14,7 @@
 use super::ContactPoint;
 use super::contact::Contact;
 use super::detect::MARGIN;
-use super::distance::{PairKind, wide};
+use super::distance::{PairKind, places, wide};
 use crate::Vector;
 
 /// Sweeps over all contacts in a pass.
@@ -200,10 +200,11 @@ impl Contact {
 
     /// Returns by how much it was too near. (mm)
     fn push_apart(&mut self, a: &mut Active) -> f64 {
-        let x = a.nodes.map(|n| wide(&self.wanted[n as usize]));
-        let now: f64 = (0..4)
-            .map(|k| a.weights[k] * a.normal.dot(&(x[k] - x[0])))
-            .sum();
+        let x = places(&a.nodes, &self.wanted);
+        let mut now = 0.0;
+        for k in 0..4 {
+            now += a.weights[k] * a.normal.dot(&(x[k] - x[0]));
+        }
         let keep = a.thickness.min(a.distance + RELEASE);
         let lack = keep - now;
         if lack <= 0.0 {
@@ -229,7 +230,7 @@ impl Contact {
 
     fn rub(&mut self, a: &Active) {
         let friction = self.lists[a.list as usize].friction;
-        let x = a.nodes.map(|n| wide(&self.wanted[n as usize]));
+        let x = places(&a.nodes, &self.wanted);
         let mut slip = Vector::zeros();
         let mut sum = 0.0;
         for k in 0..4 {

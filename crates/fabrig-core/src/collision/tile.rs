@@ -7,11 +7,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::mesh::Part;
 use super::tree::Tree;
 use crate::Vector;
+use crate::cloth::vectorized;
 
 /// Cells along an edge of a tile of a grid.
 const GRID_CELLS: u32 = 4;
@@ -38,25 +39,30 @@ impl Extent {
 
     /// The box of the ways of nodes.
     pub(crate) fn of_ways(from: &[Point3<f32>], to: &[Point3<f32>]) -> Self {
+        vectorized(OfWays { from, to })
+    }
+
+    #[inline(always)]
+    fn of_ways_lanes(from: &[Point3<f32>], to: &[Point3<f32>]) -> Self {
         let [from, to] = [from, to].map(bytemuck::cast_slice::<Point3<f32>, f32>);
-        // Four nodes beside each other.
-        let (mut lows, mut highs) = ([f32::INFINITY; 12], [f32::NEG_INFINITY; 12]);
-        let mut take = |from: &[f32], to: &[f32]| {
-            let ends = lows.iter_mut().zip(highs.iter_mut());
-            for ((low, high), (from, to)) in ends.zip(from.iter().zip(to)) {
-                let by = to - from;
-                *low = least(*low, by);
-                *high = most(*high, by);
-            }
-        };
-        let (rows_from, rest_from) = from.as_chunks::<12>();
-        let (rows_to, rest_to) = to.as_chunks::<12>();
+        // Eight nodes beside each other.
+        let (mut lows, mut highs) = ([f32::INFINITY; 24], [f32::NEG_INFINITY; 24]);
+        let (rows_from, rest_from) = from.as_chunks::<24>();
+        let (rows_to, rest_to) = to.as_chunks::<24>();
         for (from, to) in rows_from.iter().zip(rows_to) {
-            take(from, to);
+            for k in 0..24 {
+                let by = to[k] - from[k];
+                lows[k] = least(lows[k], by);
+                highs[k] = most(highs[k], by);
+            }
         }
-        take(rest_from, rest_to);
+        for (k, (from, to)) in rest_from.iter().zip(rest_to).enumerate() {
+            let by = to - from;
+            lows[k] = least(lows[k], by);
+            highs[k] = most(highs[k], by);
+        }
         let mut out = Self::EMPTY;
-        for k in 0..12 {
+        for k in 0..24 {
             out.low[k % 3] = least(out.low[k % 3], lows[k]);
             out.high[k % 3] = most(out.high[k % 3], highs[k]);
         }
@@ -73,10 +79,12 @@ impl Extent {
 
     #[inline]
     pub(crate) fn union(&self, other: &Self) -> Self {
-        Self {
-            low: std::array::from_fn(|k| least(self.low[k], other.low[k])),
-            high: std::array::from_fn(|k| most(self.high[k], other.high[k])),
+        let mut out = *self;
+        for k in 0..3 {
+            out.low[k] = least(out.low[k], other.low[k]);
+            out.high[k] = most(out.high[k], other.high[k]);
         }
+        out
     }
 
     /// Whether `other` lies within.
@@ -97,7 +105,27 @@ impl Extent {
     /// Whether two boxes come within `reach` of each other.
     #[inline]
     pub(crate) fn is_near(&self, other: &Self, reach: f32) -> bool {
-        (0..3).all(|k| self.low[k] - other.high[k] <= reach && other.low[k] - self.high[k] <= reach)
+        // One comparison at the end: most answers cannot be foreseen.
+        let mut gap = f32::NEG_INFINITY;
+        for k in 0..3 {
+            gap = most(gap, self.low[k] - other.high[k]);
+            gap = most(gap, other.low[k] - self.high[k]);
+        }
+        gap <= reach
+    }
+}
+
+struct OfWays<'a> {
+    from: &'a [Point3<f32>],
+    to: &'a [Point3<f32>],
+}
+
+impl pulp::NullaryFnOnce for OfWays<'_> {
+    type Output = Extent;
+
+    #[inline(always)]
+    fn call(self) -> Extent {
+        Extent::of_ways_lanes(self.from, self.to)
     }
 }
 
@@ -113,56 +141,62 @@ pub(super) fn most(a: f32, b: f32) -> f32 {
 }
 
 /// The ways of a tile's nodes as a box about its middle: what certificates ask for. (mm)
+///
+/// Of four numbers the last is nothing: four are what a register has.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Way {
-    pub(crate) middle: [f32; 3],
-    pub(crate) half: [f32; 3],
+    pub(crate) middle: [f32; 4],
+    pub(crate) half: [f32; 4],
 }
 
 impl Way {
+    #[inline]
     pub(crate) fn of(extent: &Extent) -> Self {
+        let ([a, b, c], [d, e, f]) = (extent.low, extent.high);
         Self {
-            middle: std::array::from_fn(|k| 0.5 * (extent.low[k] + extent.high[k])),
-            half: std::array::from_fn(|k| 0.5 * (extent.high[k] - extent.low[k])),
+            middle: [0.5 * (a + d), 0.5 * (b + e), 0.5 * (c + f), 0.0],
+            half: [0.5 * (d - a), 0.5 * (e - b), 0.5 * (f - c), 0.0],
         }
     }
 
     /// The ways of `self` against those of `other`.
     #[inline]
     pub(crate) fn against(&self, other: &Self) -> Self {
-        Self {
-            middle: std::array::from_fn(|k| self.middle[k] - other.middle[k]),
-            half: std::array::from_fn(|k| self.half[k] + other.half[k]),
+        let mut out = *self;
+        for k in 0..4 {
+            out.middle[k] -= other.middle[k];
+            out.half[k] += other.half[k];
         }
+        out
     }
 
     /// The least, and the most, that is gone along a direction. (mm)
     #[inline]
-    pub(crate) fn along(&self, n: &[f32; 3]) -> [f32; 2] {
-        let (mut middle, mut half) = (0.0, 0.0);
-        for k in 0..3 {
-            middle += n[k] * self.middle[k];
-            half += n[k].abs() * self.half[k];
+    pub(crate) fn along(&self, n: &[f32; 4]) -> [f32; 2] {
+        let (mut middle, mut half) = ([0.0; 4], [0.0; 4]);
+        for k in 0..4 {
+            middle[k] = n[k] * self.middle[k];
+            half[k] = n[k].abs() * self.half[k];
         }
+        let (middle, half) = (sum(&middle), sum(&half));
         [middle - half, middle + half]
-    }
-
-    /// The longest way in it, squared. [mm^2]
-    #[inline]
-    pub(crate) fn longest_squared(&self) -> f32 {
-        let mut sum = 0.0;
-        for k in 0..3 {
-            let most = self.middle[k].abs() + self.half[k];
-            sum += most * most;
-        }
-        sum
     }
 
     /// The longest way in it. (mm)
     #[inline]
     pub(crate) fn longest(&self) -> f32 {
-        self.longest_squared().sqrt()
+        let mut squares = [0.0; 4];
+        for k in 0..4 {
+            let most = self.middle[k].abs() + self.half[k];
+            squares[k] = most * most;
+        }
+        sum(&squares).sqrt()
     }
+}
+
+#[inline]
+fn sum(x: &[f32; 4]) -> f32 {
+    (x[0] + x[1]) + (x[2] + x[3])
 }
 
 /// A piece of a part.
@@ -171,6 +205,9 @@ pub(crate) struct Tile {
     pub(crate) part: u32,
     /// Cells of the part.
     pub(crate) cells: Vec<u32>,
+    /// Corners of its cells, in their order: of a quad (a, b, c, d) the normal is
+    /// (c - a) x (d - b), and a triangle (a, b, c) is the quad (a, a, b, c).
+    pub(crate) corners: Vec<[u32; 4]>,
     /// All nodes of its cells, rising.
     pub(crate) hull: Vec<u32>,
     /// Those that this tile alone owns.
@@ -212,6 +249,7 @@ impl Tiles {
                 hull.dedup();
                 out.tiles.push(Tile {
                     part: index as u32,
+                    corners: of_cells().filter_map(|c| corners(&c.hull)).collect(),
                     own: of_cells().flat_map(|c| c.nodes.clone()).collect(),
                     hull,
                     cells,
@@ -260,6 +298,25 @@ impl Tiles {
     ///
     /// - `rows`: room to work in
     pub(crate) fn measure(
+        &self,
+        index: usize,
+        part: &Part,
+        states: [&[Point3<f32>]; 2],
+        out: &mut [Extent],
+        rows: &mut [Vec<f32>; 2],
+    ) {
+        vectorized(Measure {
+            tiles: self,
+            index,
+            part,
+            states,
+            out,
+            rows,
+        });
+    }
+
+    #[inline(always)]
+    fn measure_lanes(
         &self,
         index: usize,
         part: &Part,
@@ -330,6 +387,25 @@ impl Tiles {
     }
 }
 
+struct Measure<'a> {
+    tiles: &'a Tiles,
+    index: usize,
+    part: &'a Part,
+    states: [&'a [Point3<f32>]; 2],
+    out: &'a mut [Extent],
+    rows: &'a mut [Vec<f32>; 2],
+}
+
+impl pulp::NullaryFnOnce for Measure<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let tiles = self.tiles;
+        tiles.measure_lanes(self.index, self.part, self.states, self.out, self.rows);
+    }
+}
+
 impl Tile {
     /// The box of its nodes at `places`.
     pub(crate) fn bounds(&self, places: &[Point3<f32>]) -> Extent {
@@ -350,27 +426,14 @@ impl Tile {
         }
         out
     }
+}
 
-    /// Sum of the normals of its cells, each as long as twice the cell's area; with `each`
-    /// called for every one.
-    pub(crate) fn normal(
-        &self,
-        part: &Part,
-        places: &[Point3<f32>],
-        mut each: impl FnMut(&Vector3<f32>),
-    ) -> Vector3<f32> {
-        let at = |n: u32| places[n as usize];
-        let mut sum = Vector3::zeros();
-        for &c in &self.cells {
-            let normal = match part.cells[c as usize].hull[..] {
-                [a, b, c, d] => (at(c) - at(a)).cross(&(at(d) - at(b))),
-                [a, b, c] => (at(b) - at(a)).cross(&(at(c) - at(a))),
-                _ => Vector3::zeros(),
-            };
-            each(&normal);
-            sum += normal;
-        }
-        sum
+/// Corners of a cell with this hull as [`Tile::corners`] has them.
+fn corners(hull: &[u32]) -> Option<[u32; 4]> {
+    match *hull {
+        [a, b, c, d] => Some([a, b, c, d]),
+        [a, b, c] => Some([a, a, b, c]),
+        _ => None,
     }
 }
 
