@@ -16,6 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::distance::PairKind;
 use super::tile::{Tile, Way, least, most};
+use crate::cloth::vectorized;
 
 /// A slab this much wider than needed makes any length superfluous. (mm)
 const AMPLE: f32 = 0.3;
@@ -119,9 +120,11 @@ impl TilePair {
         if self.gap > f32::NEG_INFINITY {
             self.gap += way.along(&self.normal)[0] - ROUNDING;
         }
-        let length = way.longest() + ROUNDING;
-        self.length -= length;
-        self.spent += length;
+        if self.length > 0.0 || self.reach >= 0.0 {
+            let length = way.longest() + ROUNDING;
+            self.length -= length;
+            self.spent += length;
+        }
     }
 
     /// Keeps a slab that was found where the tiles are now.
@@ -215,8 +218,39 @@ pub(crate) fn slab(
     normals: [Vector3<f32>; 2],
     enough: f32,
 ) -> (Vector3<f32>, f32) {
+    vectorized(Slab {
+        tiles: [a, b],
+        states,
+        normals,
+        enough,
+    })
+}
+
+struct Slab<'a> {
+    tiles: [&'a Tile; 2],
+    states: [&'a [Point3<f32>]; 2],
+    normals: [Vector3<f32>; 2],
+    enough: f32,
+}
+
+impl pulp::NullaryFnOnce for Slab<'_> {
+    type Output = (Vector3<f32>, f32);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let [a, b] = self.tiles;
+        let (a, b) = (Hull::of(a, self.states), Hull::of(b, self.states));
+        slab_of_hulls([&a, &b], self.normals, self.enough)
+    }
+}
+
+#[inline(always)]
+fn slab_of_hulls(
+    [a, b]: [&Hull; 2],
+    normals: [Vector3<f32>; 2],
+    enough: f32,
+) -> (Vector3<f32>, f32) {
     let mut best = (Vector3::zeros(), f32::NEG_INFINITY);
-    let (a, b) = (Hull::of(a, states), Hull::of(b, states));
     let between = a.middle - b.middle;
     for k in 0..4 {
         let direction = match k {
@@ -253,7 +287,7 @@ struct Hull {
 }
 
 impl Hull {
-    #[inline]
+    #[inline(always)]
     fn of(tile: &Tile, states: [&[Point3<f32>]; 2]) -> Self {
         let origin = states[0][tile.hull[0] as usize].coords;
         let [x, y, z] = [origin.x, origin.y, origin.z];
@@ -275,7 +309,7 @@ impl Hull {
     }
 
     /// The least and the most along a direction. (mm)
-    #[inline]
+    #[inline(always)]
     fn range(&self, n: &Vector3<f32>) -> [f32; 2] {
         let (mut low, mut high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
         let [x, y, z] = &self.places;

@@ -12,6 +12,7 @@ use super::project::Active;
 use super::tile::{Extent, Way, most};
 use super::tile_shape::flat_way;
 use crate::Vector;
+use crate::cloth::vectorized;
 
 /// A slab this much wider than the thickness needs no wider one. (mm)
 const WIDE_ENOUGH: f32 = 1.0;
@@ -47,6 +48,24 @@ struct Closing {
     /// Of the vector between the closest points, and that vector. (mm)
     weights: [f64; 4],
     between: Vector,
+}
+
+struct Offer<'a> {
+    contact: &'a Contact,
+    list: &'a PairList,
+    pair: &'a TilePair,
+    reach: f32,
+    bench: &'a mut Workbench,
+}
+
+impl pulp::NullaryFnOnce for Offer<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.contact
+            .offer_elements(self.list, self.pair, self.reach, self.bench);
+    }
 }
 
 impl Contact {
@@ -237,7 +256,7 @@ impl Contact {
         {
             // What they go in this pass counts from where they are, too.
             let way = flat_way(shapes);
-            if way > 0.0 && self.way_of_pass(pair) + more < way {
+            if way > 0.0 && self.stays_flat(pair, way - more) {
                 pair.keep_length(way, &self.watch.way_until_now(pair));
                 return false;
             }
@@ -269,13 +288,22 @@ impl Contact {
         pair.since_list(&self.watch.way_of(pair), self.watch.stamp)
     }
 
+    /// Whether the tiles of a pair go less than `way` (mm) against each other in this pass.
+    fn stays_flat(&self, pair: &TilePair, way: f32) -> bool {
+        // What they have gone until now and will have gone tells most times.
+        let gone = self.watch.way_until_now(pair).longest();
+        let will_have = self.watch.way_until_wanted(pair).longest();
+        gone + will_have + ROUNDING < way || self.way_of_pass(pair) < way
+    }
+
     /// How far the tiles of a pair go against each other in this pass, at most. (mm)
     fn way_of_pass(&self, pair: &TilePair) -> f32 {
-        let [a, b] = pair.tiles.map(|t| {
+        let way = |t: u32| {
             let tile = &self.tiles.tiles[t as usize];
             Way::of(&tile.ways(&self.positions, &self.wanted))
-        });
-        a.against(&b).longest()
+        };
+        let [a, b] = pair.tiles;
+        way(a).against(&way(b)).longest()
     }
 
     /// Lists the elements of a pair that are near each other where they are now.
@@ -288,7 +316,13 @@ impl Contact {
         let pass = self.way_of_pass(pair);
         let reach = pair.near.wish.max(pass + 3.0 * MARGIN as f32);
         let longest = self.thickest(list) as f32 + reach;
-        self.offer_elements(list, pair, longest, &mut bench);
+        vectorized(Offer {
+            contact: self,
+            list,
+            pair,
+            reach: longest,
+            bench: &mut bench,
+        });
         let own = list.a == list.b;
         let is_cloth = list.collider.is_none();
         let is_round = list.collider.is_some_and(|c| self.world[c].shape.is_round);
@@ -359,6 +393,7 @@ impl Contact {
 
     /// Collects the elements of all cells of two tiles that boxes and planes do not show to be
     /// further apart than `reach`. (mm)
+    #[inline(always)]
     fn offer_elements(&self, list: &PairList, pair: &TilePair, reach: f32, bench: &mut Workbench) {
         let ends = &mut bench.ends;
         let [vertices, edges] = &mut bench.nodes;

@@ -101,9 +101,16 @@ impl Watch {
     }
 
     /// The same, to where they are alone.
+    #[inline]
     pub(super) fn way_until_now(&self, pair: &TilePair) -> Way {
         let [a, b] = pair.tiles;
         Way::of(&self.now[a as usize]).against(&Way::of(&self.now[b as usize]))
+    }
+
+    /// The same, to where they are wanted alone.
+    pub(super) fn way_until_wanted(&self, pair: &TilePair) -> Way {
+        let [a, b] = pair.tiles;
+        Way::of(&self.next[a as usize]).against(&Way::of(&self.next[b as usize]))
     }
 
     pub(super) fn new(tile_count: usize, part_count: usize) -> Self {

@@ -112,7 +112,7 @@ impl TileShape {
     }
 
     /// Which cells have boxes within `reach` (mm) of another: a bit each.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn near(&self, other: &Extent, reach: f32) -> u32 {
         let mut gaps = [f32::NEG_INFINITY; MOST_CELLS];
         for k in 0..3 {
@@ -123,10 +123,10 @@ impl TileShape {
             }
         }
         let mut bits = 0;
-        for (cell, gap) in gaps.iter().enumerate().take(self.count) {
+        for (cell, gap) in gaps.iter().enumerate() {
             bits |= u32::from(*gap <= reach) << cell;
         }
-        bits
+        bits & ((1 << self.count) - 1)
     }
 
     /// The least cosine between the normals of its cells and a unit direction.
