@@ -57,8 +57,10 @@ pub(crate) struct TilePair {
     spent: f32,
     /// Up to which gap the list holds all candidates; negative: there is no list. (mm)
     pub(crate) reach: f32,
-    /// When parts were looked at last before a certificate was found.
-    pub(crate) round: u32,
+    /// When parts were looked at last before certificates were brought there, and before one
+    /// was found.
+    pub(crate) round: u64,
+    pub(crate) found: u64,
     /// Apart from what every pair is asked for.
     pub(crate) near: Box<NearElements>,
 }
@@ -89,6 +91,7 @@ impl TilePair {
             spent: 0.0,
             reach: -1.0,
             round: 0,
+            found: 0,
             near: Box::new(NearElements {
                 candidates: Vec::new(),
                 gaps: Vec::new(),
@@ -127,6 +130,18 @@ impl TilePair {
         }
     }
 
+    /// Knows nothing of how the tiles stand to each other any more.
+    pub(crate) fn forget(&mut self) {
+        (self.gap, self.length) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
+        self.drop_list();
+    }
+
+    fn drop_list(&mut self) {
+        self.reach = -1.0;
+        self.near.candidates.clear();
+        self.near.gaps.clear();
+    }
+
     /// Keeps a slab that was found where the tiles are now.
     ///
     /// - `gap`: along `normal`, beyond the thickness (mm)
@@ -134,9 +149,7 @@ impl TilePair {
     pub(crate) fn keep_slab(&mut self, normal: Vector3<f32>, gap: f32, way: &Way) {
         self.normal = [normal.x, normal.y, normal.z, 0.0];
         self.gap = gap - way.along(&self.normal)[1] - ROUNDING;
-        self.reach = -1.0;
-        self.near.candidates.clear();
-        self.near.gaps.clear();
+        self.drop_list();
     }
 
     /// Keeps a length found where the tiles are now. (mm)

@@ -94,6 +94,7 @@ impl Contact {
                     first = first.min(*due);
                     continue;
                 }
+                self.watch.catch_up(pair);
                 let clearance = pair.clearance(&self.watch.way_of(pair));
                 *due = gone + f64::from(clearance);
                 first = first.min(*due);
@@ -124,8 +125,11 @@ impl Contact {
             }
             let mut pairs = std::mem::take(&mut list.pairs);
             for pair in &mut pairs {
-                if !pair.tiles.iter().any(|&t| self.is_pushed[t as usize])
-                    || pair.clearance(&self.watch.way_of(pair)) > more as f32
+                if !pair.tiles.iter().any(|&t| self.is_pushed[t as usize]) {
+                    continue;
+                }
+                self.watch.catch_up(pair);
+                if pair.clearance(&self.watch.way_of(pair)) > more as f32
                     || !self.has_list(list, pair, more as f32)
                 {
                     continue;
@@ -243,7 +247,7 @@ impl Contact {
         if pair.reach - self.since_list(pair) > more {
             return true;
         }
-        if std::mem::replace(&mut pair.round, self.watch.round) == self.watch.round {
+        if std::mem::replace(&mut pair.found, self.watch.round) == self.watch.round {
             self.watch.repeated += 1;
         }
         let own = list.a == list.b;

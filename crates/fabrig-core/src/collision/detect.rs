@@ -3,10 +3,13 @@
 //! When parts are looked at, every tile gets a box in which its nodes may go about. Tiles whose
 //! boxes are apart cannot meet; the others are pairs ([`super::certificate`]). When nodes leave
 //! their box, all parts are looked at anew: together, so that certificates know how tiles that
-//! go the same way have gone against each other.
+//! go the same way have gone against each other. Pairs take that into their certificates when
+//! they are asked for them next.
 //!
 //! Source: the displacement bounds of Chen et al. 2025, *Offset Geometric Contact*, kept per
 //! tile and relative to the other tile here, so that they last over many substeps.
+
+use std::collections::VecDeque;
 
 use super::certificate::TilePair;
 use super::contact::Contact;
@@ -21,6 +24,8 @@ const FORESEEN: (f32, f32) = (12.0, 3.0);
 /// Certificates found for the second time since parts were looked at, after which they are
 /// looked at anew.
 const MOST_REPEATED: usize = 600;
+/// Times that parts were looked at of which ways are kept.
+const MOST_REMEMBERED: usize = 16;
 /// What is kept from the mesh inside a round collider, which only stops cells that are
 /// stretched across it: nodes are held out by its round surface. (mm)
 pub(super) const GUARD_THICKNESS: f64 = 0.05;
@@ -85,11 +90,13 @@ pub(super) struct Watch {
     /// Whether parts are to be looked at, whatever they do.
     pub(super) is_stale: bool,
     /// How often parts were looked at, and certificates that were found again since.
-    pub(super) round: u32,
+    pub(super) round: u64,
     pub(super) repeated: usize,
     /// Counts the moments at which ways were measured.
     pub(super) stamp: u64,
     rows: [Vec<f32>; 2],
+    /// Ways of tiles to where parts were looked at, the last times that they were.
+    history: VecDeque<Vec<Way>>,
 }
 
 impl Watch {
@@ -98,6 +105,36 @@ impl Watch {
     pub(super) fn way_of(&self, pair: &TilePair) -> Way {
         let [a, b] = pair.tiles;
         self.ways[a as usize].against(&self.ways[b as usize])
+    }
+
+    /// Keeps what tiles have gone to where parts are looked at anew.
+    fn remember_ways(&mut self) {
+        self.round += 1;
+        let mut oldest = match self.history.len() {
+            MOST_REMEMBERED => self.history.pop_front().unwrap_or_default(),
+            _ => Vec::new(),
+        };
+        oldest.clone_from(&self.ways);
+        self.history.push_back(oldest);
+    }
+
+    /// Brings the certificates of a pair to where parts were last looked at; one that has not
+    /// been asked for long enough loses them.
+    #[inline]
+    pub(super) fn catch_up(&self, pair: &mut TilePair) {
+        let missed = (self.round - pair.round) as usize;
+        if missed == 0 {
+            return;
+        }
+        pair.round = self.round;
+        let Some(first) = self.history.len().checked_sub(missed) else {
+            pair.forget();
+            return;
+        };
+        let [a, b] = pair.tiles.map(|t| t as usize);
+        for ways in self.history.range(first..) {
+            pair.renew(&ways[a].against(&ways[b]));
+        }
     }
 
     /// The same, to where they are alone.
@@ -216,12 +253,6 @@ impl Contact {
         for (way, now) in self.watch.ways.iter_mut().zip(&self.watch.now) {
             *way = Way::of(now);
         }
-        for list in &mut self.lists {
-            for pair in &mut list.pairs {
-                pair.renew(&self.watch.way_of(pair));
-            }
-            list.look_again();
-        }
         for collider in &mut self.world {
             for (free, (tile, _)) in collider.free.iter_mut().zip(&collider.watched) {
                 *free -= f64::from(self.watch.ways[*tile as usize].longest());
@@ -230,7 +261,7 @@ impl Contact {
         self.reference.copy_from_slice(&self.positions);
         self.watch.is_stale = false;
         self.watch.repeated = 0;
-        self.watch.round = self.watch.round.wrapping_add(1);
+        self.watch.remember_ways();
         for index in 0..self.parts.len() {
             let is_away = self.is_away(index);
             if !is_away {
@@ -280,8 +311,7 @@ impl Contact {
             if !self.is_away(list.b) {
                 self.near_tiles(list, &mut near);
             }
-            merge(&mut list.pairs, &near);
-            list.look_again();
+            merge(list, &near);
         }
         self.lists = lists;
     }
@@ -331,16 +361,60 @@ fn room(next: &Extent) -> Extent {
     }
 }
 
-/// Makes `pairs` those of `near`; both rise. What was known of pairs that stay is kept.
-fn merge(pairs: &mut Vec<TilePair>, near: &[[u32; 2]]) {
+/// Makes the pairs of a list those of `near`; both rise. What was known of pairs that stay is
+/// kept.
+fn merge(list: &mut PairList, near: &[[u32; 2]]) {
+    let pairs = &mut list.pairs;
     if pairs.len() == near.len() && pairs.iter().zip(near).all(|(p, n)| p.tiles == *n) {
         return;
     }
-    let mut old = std::mem::take(pairs).into_iter().peekable();
+    let due = std::mem::take(&mut list.due);
+    let mut old = std::mem::take(pairs).into_iter().zip(due).peekable();
     pairs.reserve(near.len());
     for tiles in near {
-        while old.next_if(|p| p.tiles < *tiles).is_some() {}
-        let kept = old.next_if(|p| p.tiles == *tiles);
-        pairs.push(kept.unwrap_or_else(|| TilePair::new(*tiles)));
+        while old.next_if(|(p, _)| p.tiles < *tiles).is_some() {}
+        let kept = old.next_if(|(p, _)| p.tiles == *tiles);
+        let (pair, due) = kept.unwrap_or_else(|| (TilePair::new(*tiles), f64::NEG_INFINITY));
+        pairs.push(pair);
+        list.due.push(due);
+    }
+    list.first_due = list.due.iter().copied().fold(f64::INFINITY, f64::min);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn a_pair_that_catches_up_knows_what_one_that_kept_up_knows() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(41);
+        for missed in 1..=MOST_REMEMBERED + 3 {
+            let mut watch = Watch::new(2, 1);
+            let mut kept_up = TilePair::new([0, 1]);
+            kept_up.keep_slab(Vector3::z(), 9.0, &Way::default());
+            kept_up.keep_length(90.0, &Way::default());
+            let mut late = kept_up.clone();
+            for _ in 0..missed {
+                for way in &mut watch.ways {
+                    let mut extent = Extent::EMPTY;
+                    for _ in 0..3 {
+                        extent.take(&[0; 3].map(|_| random.random_range(-0.1..0.1)));
+                    }
+                    *way = Way::of(&extent);
+                }
+                watch.remember_ways();
+                watch.catch_up(&mut kept_up);
+            }
+            watch.catch_up(&mut late);
+            let [kept_up, late] = [&kept_up, &late].map(|p| p.clearance(&Way::default()));
+            assert!(kept_up > 0.0 && kept_up < 90.0);
+            if missed > MOST_REMEMBERED {
+                assert_eq!(late, f32::NEG_INFINITY, "it knows nothing any more");
+            } else {
+                assert_eq!(late, kept_up, "{missed} times");
+            }
+        }
     }
 }
