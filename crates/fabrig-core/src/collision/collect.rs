@@ -376,13 +376,20 @@ impl Contact {
     /// Takes half the distance at rest for the thickness of the candidates from `first` on,
     /// where that is less, and drops those that are then further than `reach` from it.
     ///
-    /// - `rest`: how far each of them is apart at rest (mm)
+    /// - `rest`: how far each of them is apart at rest, at least (mm)
     fn keep_at_most_rest(&self, pair: &mut TilePair, first: usize, reach: f32, rest: &[f32]) {
         let mut kept = first;
         for (k, rest) in (first..).zip(rest) {
             let mut candidate = pair.near.candidates[k];
-            let at_rest = REST_SHARE * f64::from(most(rest + ROUNDING, 0.0));
-            let thickness = self.options.thickness.min(at_rest) as f32;
+            // Mostly the plane shows that they are far enough apart; where it does not, only the
+            // distance tells, for what is kept is never to be less than its share.
+            let mut thickness = self.options.thickness;
+            if REST_SHARE * f64::from(*rest) <= thickness {
+                let at = places(&candidate.nodes, &self.rest);
+                let at_rest = weighted(&closest_weights(candidate.kind, &at), &at).norm();
+                thickness = thickness.min(REST_SHARE * at_rest);
+            }
+            let thickness = thickness as f32;
             let gap = pair.near.gaps[k] + (candidate.thickness - thickness);
             candidate.thickness = thickness;
             if gap <= reach {
