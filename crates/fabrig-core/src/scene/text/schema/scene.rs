@@ -72,6 +72,11 @@ pub(in crate::scene::text) const SCENE: &[Key] = &[
         "a random acceleration of everything, as in a car",
         "{}",
     ),
+    Key::new(
+        "skin_smoothing",
+        from_to(0.0, 50.0),
+        "width over which skin averages what patches do beyond their muscle shapes (mm)",
+    ),
     Key::new("simulate", Kind::Table(SIMULATE), "which patches are cloth"),
     Key::new(
         "economy",
