@@ -16,7 +16,7 @@ use crate::template::RigidBody;
 const OPENING: [f32; 2] = [0.3, 0.7];
 /// Lengths that follow the muscle shapes by the first or less are skin that is to fold, by the second
 /// or more skin that is not.
-const LOOSE: [f32; 2] = [0.5, 0.8];
+const LOOSE: [f32; 2] = [0.7, 0.85];
 
 /// What lies on an eyeball stays on it: there skin takes all, and this much less with every edge away.
 const LESS_BESIDE_EYES: f32 = 0.25;
