@@ -37,6 +37,11 @@ pub(in crate::scene::text) const SCENE: &[Key] = &[
         Kind::Word(&["shapes", "tracked"]),
         "\"tracked\": turned by the take's eye rotations, where it has them",
     ),
+    Key::new(
+        "skin_smoothing",
+        from_to(0.0, 50.0),
+        "width over which skin averages what patches do beyond their muscle shapes (mm)",
+    ),
     Key::optional(
         "fps",
         positive(1e4),
@@ -71,11 +76,6 @@ pub(in crate::scene::text) const SCENE: &[Key] = &[
         Kind::Table(SHAKE),
         "a random acceleration of everything, as in a car",
         "{}",
-    ),
-    Key::new(
-        "skin_smoothing",
-        from_to(0.0, 50.0),
-        "width over which skin averages what patches do beyond their muscle shapes (mm)",
     ),
     Key::new("simulate", Kind::Table(SIMULATE), "which patches are cloth"),
     Key::new(
