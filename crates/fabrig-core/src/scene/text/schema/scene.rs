@@ -204,8 +204,14 @@ pub(super) const FACE: &[Key] = &[
     Key::required(
         "rig",
         Kind::Path,
-        "as `fabrig rig` makes it",
+        "as `fabrig rig` makes it, or a mesh, which is rigged first",
         "\"face.fabrig\"",
+    ),
+    Key::optional(
+        "resolution",
+        Kind::Text,
+        "patches of a mesh: coarse, standard, fine, finest, an accuracy (0.3mm) or view size (900px)",
+        "\"standard\"",
     ),
     Key::optional(
         "motion",
