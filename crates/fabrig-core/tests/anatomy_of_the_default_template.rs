@@ -276,6 +276,44 @@ fn muscles_hold_to_bone_and_to_their_neighbours_on_their_own_side() {
 }
 
 #[test]
+fn lids_lie_on_the_eyeball() {
+    for (eye, side) in human().eyes.iter().zip(["l", "r"]) {
+        let mut held_count = 0;
+        for (name, reach) in [("orbicularis_oculi", 1.5), ("periorbital_fat", 3.0)] {
+            let patch = &PATCHES[find(&format!("{name}_{side}"))];
+            let held: Vec<u32> = patch
+                .chart
+                .attachments
+                .iter()
+                .filter_map(|a| match a {
+                    Attachment::Body { body, nodes, .. } => Some((body, nodes)),
+                    Attachment::Patch { .. } => None,
+                })
+                .flat_map(|(body, nodes)| {
+                    assert!(matches!(body, RigidBody::EyeLeft | RigidBody::EyeRight));
+                    assert_eq!(*body == RigidBody::EyeLeft, side == "l");
+                    nodes.clone()
+                })
+                .collect();
+            let mut unique = held.clone();
+            unique.sort_unstable();
+            unique.dedup();
+            assert_eq!(unique.len(), held.len(), "{name} holds a node twice");
+            for (node, at) in patch.neutral.iter().enumerate() {
+                let height = (at - eye.center).norm() - eye.radius;
+                let is_held = unique.binary_search(&(node as u32)).is_ok();
+                assert!(
+                    is_held || height >= reach,
+                    "{name} {node}: {height} mm, free"
+                );
+            }
+            held_count += held.len();
+        }
+        assert!(held_count > 200, "{held_count}");
+    }
+}
+
+#[test]
 fn skin_that_moves_has_a_patch_under_it() {
     for shape in coverage(human(), &CHARTS, 0.5, 6.0) {
         // The tongue moves no skin that is seen.

@@ -402,7 +402,9 @@ pub(crate) fn animate_scene<'py>(
     };
     let mut progress = Progress::new(py, progress)?;
     let report = py.detach(|| {
-        let faces = load_faces(&scene, &ReadOptions::default())?;
+        let faces = load_faces(&scene, &ReadOptions::default(), &mut |step| {
+            progress.report(step.stage, step.fraction)
+        })?;
         fabrig_core::pipeline::animate_scene(&scene, faces, &output, &options, &mut |now| {
             progress.report("simulate", now.frame as f64 / now.frame_count as f64)
         })

@@ -18,6 +18,7 @@ use crate::arrays;
 use crate::errors::{SceneError as SceneFailure, input, to_py};
 use crate::motion::PyClip;
 use crate::pose::weights_of;
+use crate::progress::Progress;
 use crate::render::{Content, Shot, draw_simulation};
 use crate::rig::PyRig;
 
@@ -447,17 +448,21 @@ impl PySimulation {
         };
         let mut only = scene.clone();
         only.faces = vec![scene.faces[index].clone()];
-        let (inner, rig) = py
-            .detach(|| -> Result<_, fabrig_core::Error> {
-                let faces = load_faces(&only, &ReadOptions::default())?;
-                let [face] = <[StagedFace; 1]>::try_from(faces)
-                    .map_err(|faces| SceneError::HasFaces { count: faces.len() })?;
-                let rig = Arc::clone(&face.rig);
-                let mut inner = Simulation::new(face.rig, face.scene, face.clip)?;
-                inner.start_at(0.0)?;
-                Ok((inner, rig))
-            })
-            .map_err(to_py)?;
+        // Rigging a mesh can be interrupted.
+        let mut progress = Progress::new(py, None)?;
+        let staged = py.detach(|| -> Result<_, fabrig_core::Error> {
+            let faces = load_faces(&only, &ReadOptions::default(), &mut |step| {
+                progress.report(step.stage, step.fraction)
+            })?;
+            let [face] = <[StagedFace; 1]>::try_from(faces)
+                .map_err(|faces| SceneError::HasFaces { count: faces.len() })?;
+            let rig = Arc::clone(&face.rig);
+            let mut inner = Simulation::new(face.rig, face.scene, face.clip)?;
+            inner.start_at(0.0)?;
+            Ok((inner, rig))
+        });
+        progress.finish()?;
+        let (inner, rig) = staged.map_err(to_py)?;
         let rig = Py::new(py, PyRig { inner: rig })?;
         Ok(Self { inner, rig })
     }

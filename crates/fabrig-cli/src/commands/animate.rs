@@ -77,8 +77,11 @@ fn run_faces(console: &Console, args: &AnimateArgs, mut scene: Scene) -> Result<
     if let Some(motion) = &args.motion {
         face.motion = Some(std::path::absolute(motion)?);
     }
-    let faces =
-        load_faces(&scene, &read_options(&args.take)).with_context(|| in_scene(&args.scene))?;
+    let faces = load_faces(&scene, &read_options(&args.take), &mut |step| {
+        console.share(step.stage, step.fraction)
+    });
+    console.clear();
+    let faces = faces.with_context(|| in_scene(&args.scene))?;
     let options = AnimateOptions {
         fps: args.scene.fps,
         recording: args.recording.options(&scene.recording),

@@ -54,7 +54,8 @@ struct FaceSummary {
 
 fn check(console: &Console, args: &SceneCheckArgs) -> Result<Outcome> {
     let scene = load_scene(&args.scene)?;
-    let summary = summary(&scene).with_context(|| format!("in {}", args.scene.display()))?;
+    let summary =
+        summary(console, &scene).with_context(|| format!("in {}", args.scene.display()))?;
     if args.json {
         console.result(&serde_json::to_string_pretty(&summary)?);
     } else {
@@ -64,8 +65,11 @@ fn check(console: &Console, args: &SceneCheckArgs) -> Result<Outcome> {
 }
 
 /// Goes as far as a simulation's first frame, so that everything a scene names is looked for.
-fn summary(scene: &Scene) -> Result<Summary> {
-    let staged = load_faces(scene, &ReadOptions::default())?;
+fn summary(console: &Console, scene: &Scene) -> Result<Summary> {
+    let staged = load_faces(scene, &ReadOptions::default(), &mut |step| {
+        console.share(step.stage, step.fraction)
+    })?;
+    console.clear();
     let pairs = serde_json::to_value(scene.contact.pairs)?;
     let mut summary = Summary {
         fps: scene.fps,

@@ -1,14 +1,18 @@
 //! What patches are held to: bone at the origin, neighbours at the insertion, what lies under
-//! a fat pad, what a ring opens on (Eq. 5).
+//! a fat pad, what a ring opens on, the eyeball that it lies on (Eq. 5).
 
 use super::error::AnatomyError;
 use super::layout::{HoldText, Layout};
 use super::patch::{Attachment, Patch, PatchChart, Side};
 use crate::Point;
+use crate::template::{EyeSocket, RigidBody};
 
 /// Fills in the attachments of charts that lie at `patches` on the template.
+///
+/// - `eyes`: of the template, left and right
 pub(super) fn attach(
     layout: &Layout,
+    eyes: &[EyeSocket; 2],
     charts: &mut [PatchChart],
     patches: &[Patch],
 ) -> Result<(), AnatomyError> {
@@ -23,20 +27,29 @@ pub(super) fn attach(
             ("insertion", &text.insertion),
             ("over", &text.over),
             ("opening", &text.opening),
+            ("near", &text.near),
         ];
         for (key, hold) in holds {
             let Some(hold) = hold else { continue };
             let held = columns(hold.share);
             let rows = (hold.share * f64::from(chart.grid.v_count)).ceil() as u32;
+            let is_held = |node: &u32| held_by(&attachments, *node);
+            let is_near = |node: &u32| {
+                let eye = &eyes[usize::from(hold.body == Some(RigidBody::EyeRight))];
+                let at = patches[index].neutral[*node as usize];
+                (at - eye.center).norm() - eye.radius < hold.reach
+            };
             let nodes: Vec<u32> = (0..chart.nodes.len() as u32)
                 .filter(|node| match key {
                     "origin" => node % u_count < held,
                     "insertion" => node % u_count >= u_count - held,
                     "opening" => node / u_count < rows,
+                    "near" => is_near(node) && !is_held(node),
                     _ => true,
                 })
                 .collect();
-            if let Some(body) = hold.body {
+            // Of a coarse patch no node may be near.
+            if let Some(body) = hold.body.filter(|_| !nodes.is_empty()) {
                 attachments.push(Attachment::Body {
                     body,
                     nodes: nodes.clone(),
@@ -55,6 +68,14 @@ pub(super) fn attach(
         }
     }
     Ok(())
+}
+
+/// Whether a body holds a node already.
+fn held_by(attachments: &[Attachment], node: u32) -> bool {
+    attachments.iter().any(|attachment| match attachment {
+        Attachment::Body { nodes, .. } => nodes.contains(&node),
+        Attachment::Patch { .. } => false,
+    })
 }
 
 /// Pairs each node with the nearest node of the named patches, within reach.

@@ -80,7 +80,7 @@ pub fn charts(
             check_grid(&places.skin, patch)?;
         }
     }
-    attach(&layout, &mut charts, &patches)?;
+    attach(&layout, &template.eyes, &mut charts, &patches)?;
     Ok(charts)
 }
 

@@ -79,6 +79,9 @@ pub(super) struct PatchText {
     /// Of a sphincter: what its first rings are held to, those around the opening.
     #[serde(default)]
     pub(super) opening: Option<HoldText>,
+    /// An eyeball that the patch lies on where it is within reach of it.
+    #[serde(default)]
+    pub(super) near: Option<HoldText>,
 }
 
 /// The closed loop of mesh edges around an opening, through two corners.
@@ -118,7 +121,7 @@ pub(super) struct HoldText {
     /// Part of the fibre length that is held, from that end.
     #[serde(default)]
     pub(super) share: f64,
-    /// Greatest distance between nodes held together. (mm)
+    /// Greatest distance between nodes held together, or from the eyeball. (mm)
     #[serde(default)]
     pub(super) reach: f64,
     /// Stiffness relative to stretch.
@@ -173,7 +176,14 @@ impl PatchText {
             ("insertion", &self.insertion),
             ("over", &self.over),
             ("opening", &self.opening),
+            ("near", &self.near),
         ];
+        if let Some(hold) = &self.near {
+            let is_eye = matches!(hold.body, Some(RigidBody::EyeLeft | RigidBody::EyeRight));
+            if !is_eye || !hold.patches.is_empty() {
+                return Err(self.bad_value("near", "`body` an eyeball, and no patches", hold));
+            }
+        }
         if let (Some(hold), true) = (&self.opening, self.kind != PatchKind::Sphincter) {
             return Err(self.bad_value("opening", "a sphincter; others have none", hold));
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup};
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, Precision};
-use super::lanes::{F32x8, F64x8, Real};
+use super::lanes::{F32x4, F32x8, F64x8, Real};
 
 /// Where a patch is, and what its input must look like.
 #[derive(Debug, Clone, Copy)]
@@ -91,6 +91,10 @@ fn make_group(
     match options.precision {
         Precision::Double => Box::new(Group::<F64x8>::new(patches, members, options)),
         Precision::SingleScalar => Box::new(Group::<f32>::new(patches, members, options)),
+        // Half a register moves half as much memory.
+        Precision::Single if members.len() <= F32x4::LANES => {
+            Box::new(Group::<F32x4>::new(patches, members, options))
+        }
         Precision::Single => Box::new(Group::<F32x8>::new(patches, members, options)),
     }
 }

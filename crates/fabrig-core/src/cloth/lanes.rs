@@ -224,6 +224,10 @@ macro_rules! lanes {
 }
 
 lanes!(
+    /// Four single-precision lanes.
+    F32x4, f32, 4, 16
+);
+lanes!(
     /// Eight single-precision lanes.
     F32x8, f32, 8, 32
 );

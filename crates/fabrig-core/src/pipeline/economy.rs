@@ -2,11 +2,12 @@
 
 use serde::Serialize;
 
-use super::TimeStatistics;
 use crate::scene::{EconomyReport, FrameReport};
 
 /// Frames that must have been modelled whole before their time says what all would have taken.
 const LEAST_WHOLE: usize = 5;
+/// Share of the frames at either end of their times that say nothing: something else ran then.
+const TRIMMED: f64 = 0.1;
 
 /// What a take was spared.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -43,17 +44,19 @@ pub struct EconomySummary {
 #[derive(Default)]
 pub(super) struct EconomyLog {
     reports: Vec<EconomyReport>,
-    all_ms: f64,
     whole_ms: Vec<f64>,
+    spared_ms: Vec<f64>,
 }
 
 impl EconomyLog {
     /// - `ms`: time that simulating the frame took
     pub(super) fn take(&mut self, report: &FrameReport, ms: f64) {
-        self.all_ms += ms;
-        if report.economy.is_whole {
-            self.whole_ms.push(ms);
-        }
+        let times = if report.economy.is_whole {
+            &mut self.whole_ms
+        } else {
+            &mut self.spared_ms
+        };
+        times.push(ms);
         self.reports.push(report.economy);
     }
 
@@ -72,8 +75,9 @@ impl EconomyLog {
         };
         let storm = self.reports.iter().filter(|r| r.is_storm);
         let count = self.reports.len();
-        let typical = TimeStatistics::of(self.whole_ms.clone()).median;
-        let is_known = self.whole_ms.len() >= LEAST_WHOLE && typical > 0.0;
+        let (whole, spared) = (trimmed_mean(&self.whole_ms), trimmed_mean(&self.spared_ms));
+        let spared_share = self.spared_ms.len() as f64 / count.max(1) as f64;
+        let is_known = self.whole_ms.len() >= LEAST_WHOLE && whole > 0.0;
         EconomySummary {
             tolerance,
             frames: count as u64,
@@ -93,9 +97,18 @@ impl EconomyLog {
             estimate: largest(|r| r.estimate),
             bound: largest(|r| r.bound),
             storm_frames: storm.count() as u64,
-            time_saved: is_known.then(|| 1.0 - self.all_ms / (typical * count as f64)),
+            time_saved: is_known.then(|| spared_share * (1.0 - spared / whole)),
         }
     }
+}
+
+/// The mean without what is longest and what is shortest; 0 of nothing.
+fn trimmed_mean(times: &[f64]) -> f64 {
+    let mut times = times.to_vec();
+    times.sort_unstable_by(f64::total_cmp);
+    let cut = (TRIMMED * times.len() as f64) as usize;
+    let kept = &times[cut..times.len() - cut];
+    kept.iter().sum::<f64>() / kept.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -138,6 +151,15 @@ mod tests {
         assert_eq!((summary.estimate, summary.bound), (0.05, 0.07));
         assert_eq!(summary.storm_frames, 0);
         assert_eq!(summary.time_saved, Some(1.0 - 25.0 / 40.0));
+        // A frame in which something else ran changes nothing.
+        let mut disturbed = EconomyLog::default();
+        for ms in [4.0; 20].into_iter().chain([400.0]) {
+            disturbed.take(&frame(0, 8, true), ms);
+        }
+        for ms in [1.0; 20].into_iter().chain([900.0]) {
+            disturbed.take(&frame(2, 4, false), ms);
+        }
+        assert_eq!(disturbed.summary(0.1).time_saved, Some(0.5 * 0.75));
         let mut short = EconomyLog::default();
         short.take(&frame(0, 8, true), 4.0);
         assert_eq!(short.summary(0.1).time_saved, None);

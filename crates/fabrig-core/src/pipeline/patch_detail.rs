@@ -52,13 +52,16 @@ pub enum PatchDetail {
 
 /// A text that says no [`PatchDetail`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "'{found}' is not one of coarse, standard, fine, finest, and neither an accuracy such as 0.3mm \
-     nor the height of the face in a picture such as 900px"
-)]
+#[error("'{found}' is not {}", Self::EXPECTED)]
 pub struct PatchDetailError {
     /// What was found.
     pub found: String,
+}
+
+impl PatchDetailError {
+    /// What there should have been.
+    pub const EXPECTED: &str = "one of coarse, standard, fine, finest, an accuracy such as 0.3mm, or \
+                                the height of the face in a picture such as 900px";
 }
 
 impl PatchDetail {

@@ -1,5 +1,6 @@
 //! A scene with faces of its own, from its files to one recording.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,13 +9,23 @@ use serde::Serialize;
 
 use super::animate::{Cast, DEFAULT_RATE, Run, record_cast};
 use super::frames::FrameMaker;
-use super::{AnimateOptions, AnimateProgress, AnimateReport, recording_rate};
+use super::patch_detail::PatchDetailError;
+use super::{
+    AnimateOptions, AnimateProgress, AnimateReport, PatchDetail, RigFaceOptions, recording_rate,
+    rig_face,
+};
 use crate::Error;
 use crate::edit::{Edits, edits_path};
 use crate::facs::nearest_name;
+use crate::mesh::io::read_mesh;
 use crate::motion::{self, Clip, ReadOptions};
+use crate::registration::Progress;
 use crate::rig::Rig;
 use crate::scene::{Scene, SceneError, Simulation};
+use crate::template::human;
+
+/// What the files of rigs end in.
+const RIG_EXTENSION: &str = "fabrig";
 
 /// A face of a scene with its files read.
 #[derive(Debug, Clone)]
@@ -40,20 +51,38 @@ pub struct StageReport {
     pub faces: Vec<(String, AnimateReport)>,
 }
 
-/// Reads the rigs, edits and takes of a scene.
+/// Reads the rigs, edits and takes of a scene, and rigs what is a mesh: once, where several faces are
+/// of the same.
 ///
 /// - `takes`: how takes are read
+/// - `progress`: of rigging, as for [`rig_face`]
 ///
 /// # Errors
 ///
 /// [`Error::Scene`] with the place in the scene's text: for files that are not there with the
 /// nearest that is, for those that cannot be used with the reason.
-pub fn load_faces(scene: &Scene, takes: &ReadOptions) -> Result<Vec<StagedFace>, Error> {
+pub fn load_faces(
+    scene: &Scene,
+    takes: &ReadOptions,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Vec<StagedFace>, Error> {
+    let mut rigged = Rigged::new();
     let faces = 0..scene.faces.len();
-    faces.map(|index| load_face(scene, index, takes)).collect()
+    faces
+        .map(|index| load_face(scene, index, takes, &mut rigged, progress))
+        .collect()
 }
 
-fn load_face(scene: &Scene, index: usize, takes: &ReadOptions) -> Result<StagedFace, Error> {
+/// Meshes that were rigged, by file and resolution.
+type Rigged = BTreeMap<(PathBuf, Option<String>), Rig>;
+
+fn load_face(
+    scene: &Scene,
+    index: usize,
+    takes: &ReadOptions,
+    rigged: &mut Rigged,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<StagedFace, Error> {
     let face = &scene.faces[index];
     let refused = |key: &str, error: Error| -> Error {
         let error = SceneError::File(Box::new(error));
@@ -79,7 +108,18 @@ fn load_face(scene: &Scene, index: usize, takes: &ReadOptions) -> Result<StagedF
             .into())
     };
     let rig_path = file("rig", &face.rig)?;
-    let mut rig = Rig::load(&rig_path).map_err(|e| refused("rig", e.into()))?;
+    let is_mesh = rig_path.extension().is_some_and(|e| e != RIG_EXTENSION);
+    let detail = detail_of(scene, index, is_mesh)?;
+    let mut rig = if is_mesh {
+        let key = (rig_path.clone(), face.resolution.clone());
+        if !rigged.contains_key(&key) {
+            let rig = rig_mesh(&rig_path, detail, progress).map_err(|e| refused("rig", e))?;
+            rigged.insert(key.clone(), rig);
+        }
+        rigged[&key].clone()
+    } else {
+        Rig::load(&rig_path).map_err(|e| refused("rig", e.into()))?
+    };
     let (key, edits) = match &face.edits {
         Some(path) => ("edits", Some(Edits::load(file("edits", path)?))),
         None => ("rig", Edits::beside(&rig_path).transpose()),
@@ -109,6 +149,46 @@ fn load_face(scene: &Scene, index: usize, takes: &ReadOptions) -> Result<StagedF
         staged.clip = Some(clip);
     }
     Ok(staged)
+}
+
+/// How fine the patches of a face become.
+fn detail_of(scene: &Scene, index: usize, is_mesh: bool) -> Result<PatchDetail, Error> {
+    let Some(text) = &scene.faces[index].resolution else {
+        return Ok(PatchDetail::default());
+    };
+    let key = format!("faces[{index}].resolution");
+    if !is_mesh {
+        let expected = "nothing, as a rig has the patches it was made with (give a mesh as `rig`, \
+                        or make it by `fabrig rig --resolution`)";
+        let found = format!("'{text}'");
+        return Err(scene
+            .source
+            .value(&key, expected.to_owned(), found, None)
+            .into());
+    }
+    let read = text.parse::<PatchDetail>();
+    read.map_err(|error| {
+        let expected = PatchDetailError::EXPECTED.to_owned();
+        scene
+            .source
+            .value(&key, expected, format!("'{}'", error.found), None)
+            .into()
+    })
+}
+
+/// Rigs a mesh as `fabrig rig` does by itself.
+fn rig_mesh(
+    path: &Path,
+    detail: PatchDetail,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Rig, Error> {
+    let mut options = RigFaceOptions::default();
+    options.rig.resolution = detail.resolution();
+    let rigged = rig_face(&read_mesh(path)?, human(), &options, progress)?;
+    let mut rig = rigged.rig;
+    // Without its pictures the face moves as well.
+    let _ = rig.keep_appearance(path);
+    Ok(rig)
 }
 
 /// The file in the same folder that is spelled most like one that is not there.
@@ -246,6 +326,10 @@ mod tests {
                        position = [120, 0, 0]\nstart = 0.06\nspeed = 0.5\n\
                        materials = { fat = { magnet_frequency_hz = 5 } }\n";
 
+    fn go_on(_: Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
     fn folder() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         coarse_rig().save(folder.path().join("ann.fabrig")).unwrap();
@@ -262,7 +346,7 @@ mod tests {
 
     fn record(folder: &Path, text: &str, name: &str) -> (PathBuf, StageReport) {
         let scene = read(folder, text);
-        let faces = load_faces(&scene, &ReadOptions::default()).unwrap();
+        let faces = load_faces(&scene, &ReadOptions::default(), &mut go_on).unwrap();
         let options = AnimateOptions {
             recording: scene.recording.options(),
             ..AnimateOptions::default()
@@ -341,8 +425,12 @@ mod tests {
     fn files_that_are_not_there_or_no_use_are_told_with_their_place() {
         let folder = folder();
         let said = |text: &str| {
-            let error =
-                load_faces(&read(folder.path(), text), &ReadOptions::default()).unwrap_err();
+            let error = load_faces(
+                &read(folder.path(), text),
+                &ReadOptions::default(),
+                &mut go_on,
+            )
+            .unwrap_err();
             let mut message = error.to_string();
             let mut cause = std::error::Error::source(&error);
             while let Some(inner) = cause {
@@ -367,9 +455,56 @@ mod tests {
         let scene = read(folder.path(), "[[faces]]\nrig = \"ann.fabrig\"\n");
         let error = scene_duration(
             &scene,
-            &load_faces(&scene, &ReadOptions::default()).unwrap(),
+            &load_faces(&scene, &ReadOptions::default(), &mut go_on).unwrap(),
         )
         .unwrap_err();
         assert!(error.to_string().contains("`duration`"), "{error}");
+    }
+
+    #[test]
+    fn a_mesh_is_rigged_at_the_resolution_that_the_scene_says() {
+        let folder = folder();
+        let folder = folder.path();
+        crate::mesh::io::write_obj(folder.join("bare.obj"), &crate::template::demo_face()).unwrap();
+        let text = "duration = 0.1\n\
+                    [[faces]]\nname = \"a\"\nrig = \"bare.obj\"\nresolution = \"coarse\"\n\
+                    [[faces]]\nname = \"b\"\nrig = \"bare.obj\"\nresolution = \"coarse\"\n";
+        let mut stages = Vec::new();
+        let mut progress = |step: Progress| {
+            stages.push(step.fraction);
+            ControlFlow::Continue(())
+        };
+        let scene = read(folder, text);
+        let faces = load_faces(&scene, &ReadOptions::default(), &mut progress).unwrap();
+        assert_eq!(faces[0].rig, faces[1].rig);
+        let nodes = |rig: &Rig| {
+            rig.patches
+                .iter()
+                .map(|p| p.patch.neutral.len())
+                .sum::<usize>()
+        };
+        let coarse = coarse_rig();
+        assert_eq!(nodes(&faces[0].rig), nodes(&coarse));
+        let starts = stages.windows(2).filter(|w| w[1] < w[0]).count();
+        assert_eq!(starts, 0, "it is rigged once: {stages:?}");
+        let mut stopped = |_: Progress| ControlFlow::Break(());
+        assert!(load_faces(&scene, &ReadOptions::default(), &mut stopped).is_err());
+        for (text, expected) in [
+            (
+                "[[faces]]\nrig = \"bare.obj\"\nresolution = \"huge\"\n",
+                "0.3mm",
+            ),
+            (
+                "[[faces]]\nrig = \"ann.fabrig\"\nresolution = \"fine\"\n",
+                "a mesh as `rig`",
+            ),
+        ] {
+            let scene = read(folder, text);
+            let error = load_faces(&scene, &ReadOptions::default(), &mut go_on).unwrap_err();
+            let message = error.to_string();
+            for part in ["line 3", "`faces[0].resolution`", expected] {
+                assert!(message.contains(part), "no '{part}' in: {message}");
+            }
+        }
     }
 }

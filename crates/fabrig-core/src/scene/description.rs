@@ -74,6 +74,9 @@ pub struct Scene {
     pub contact: ContactOptions,
     /// Things of the world that the face can touch.
     pub colliders: Vec<Collider>,
+    /// Width (standard deviation) over which skin averages what patches do beyond their muscle
+    /// shapes, as [`SheetFilter`](crate::skin::SheetFilter) says; 0: not at all. (mm)
+    pub skin_smoothing: f64,
     /// Which patches are cloth.
     pub simulate: Simulate,
     /// What may be left out, and how far the result may then be off.
@@ -111,6 +114,7 @@ impl Default for Scene {
             eyes: EyeSource::default(),
             contact: ContactOptions::default(),
             colliders: Vec::new(),
+            skin_smoothing: 3.5,
             simulate: Simulate::default(),
             economy: Economy::default(),
             materials: BTreeMap::new(),

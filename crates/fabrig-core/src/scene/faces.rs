@@ -145,8 +145,12 @@ impl RecordingChoice {
 pub struct SceneFace {
     /// Its name, one of its kind in the scene; that of the rig's file when empty.
     pub name: String,
-    /// The rig, as `fabrig rig` makes it; beside the scene file unless the path is absolute.
+    /// The rig, as `fabrig rig` makes it, or a mesh, which is rigged first as that does by itself;
+    /// beside the scene file unless the path is absolute.
     pub rig: PathBuf,
+    /// How fine the patches of a mesh become, as [`PatchDetail`](crate::pipeline::PatchDetail) reads
+    /// it: `standard`, `0.3mm`, `900px`.
+    pub resolution: Option<String>,
     /// The take; without one the face is at rest but for what acts on it.
     pub motion: Option<PathBuf>,
     /// Edits of the rig; those beside the rig when not said.
@@ -176,6 +180,7 @@ impl Default for SceneFace {
         Self {
             name: String::new(),
             rig: PathBuf::new(),
+            resolution: None,
             motion: None,
             edits: None,
             position,

@@ -15,6 +15,7 @@ mod head;
 mod modelled;
 mod simulation;
 mod skin_contact;
+mod skin_sheet;
 #[cfg(test)]
 pub(crate) mod tests;
 mod text;

@@ -24,6 +24,7 @@ use crate::scene::economy::{EconomyReport, Thrift};
 use crate::scene::fields::{Curve, Fields, HeadDrive};
 use crate::scene::modelled::{Modelled, middle};
 use crate::scene::skin_contact::{SkinContact, SkinContactReport};
+use crate::scene::skin_sheet::SkinSheet;
 use crate::scene::{Dynamics, EyeSource, Scene, SceneError};
 use crate::skin::SkinDeformer;
 use crate::template::RigidBody;
@@ -131,6 +132,7 @@ pub struct Simulation {
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
     anchored: Vec<BoneAnchors>,
+    skin_sheet: SkinSheet,
     deformer: SkinDeformer,
     skin: Vec<Point3<f32>>,
 }
@@ -166,6 +168,7 @@ impl Simulation {
         };
         let eyeballs = eyeballs(&rig);
         let mut contact = FaceContact::new(&rig, &scene, &patches, &modelled, &eyeballs)?;
+        let skin_sheet = SkinSheet::new(&rig, &scene, &modelled);
         let skin = rig.skin_at_rest();
         let skin_contact = SkinContact::new(&rig, &scene, &eyeballs, &skin)?;
         if let (Some(of_cloth), Some(of_skin)) = (&mut contact, &skin_contact) {
@@ -219,6 +222,7 @@ impl Simulation {
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
             anchored,
+            skin_sheet,
             deformer,
             skin,
         };
@@ -575,6 +579,8 @@ impl Simulation {
             .collect();
         let mandible = self.rig.mandible(&self.pose.weights);
         let is_again = self.has_skin && self.scene.economy.skin && self.skin_contact.is_none();
+        let has_moved = |patch: usize| !is_again || self.has_moved[patch];
+        let nodes = self.skin_sheet.take(&nodes, &self.targets, has_moved);
         if is_again {
             self.skin_moved = self.deformer.deform_again(
                 &self.rig.binding,

@@ -82,7 +82,7 @@ impl SkinDeformer {
                 .into_iter()
                 .map(|(grid, nodes)| NodeFrames::new(grid, nodes))
                 .collect(),
-            affines: vec![[0.0; 12]; count],
+            affines: vec![Numbers::default(); count],
             rest,
         })
     }
@@ -219,54 +219,111 @@ impl SkinDeformer {
             rest = others;
         }
         if moved & MANDIBLE != 0 {
-            rest[0] = numbers(&mandible);
+            rest[0] = mandible.into();
             self.last_mandible = mandible;
         }
         by_patch
             .into_par_iter()
             .for_each(|(frames, now, last, affines)| {
                 for (node, out) in affines.iter_mut().enumerate() {
-                    *out = numbers(&frames.affine(now, node));
+                    *out = frames.affine(now, node).into();
                 }
                 last.copy_from_slice(now);
             });
-        let (affines, movers) = (&self.affines, &self.movers);
-        out.par_iter_mut()
-            .zip(&self.rest)
-            .enumerate()
-            .with_min_len(256)
-            .filter(|(vertex, _)| moved == u64::MAX || movers[*vertex] & moved != 0)
-            .map(|(vertex, (out, rest))| {
-                // Maps are summed as numbers, so that one is applied a vertex, not one a node.
-                let mut sum = [0.0; 12];
-                for (node, weight) in binding.row(vertex) {
-                    let affine = &affines[node as usize];
-                    for k in 0..12 {
-                        sum[k] += affine[k] * weight;
-                    }
-                }
-                *out = rest + displacement(&sum, rest);
+        let deformer = &*self;
+        let chunks = out.par_chunks_mut(CHUNK).enumerate();
+        let arch = pulp::Arch::new();
+        chunks
+            .map(|(chunk, out)| {
+                arch.dispatch(MoveVertices {
+                    deformer,
+                    binding,
+                    moved,
+                    first: chunk * CHUNK,
+                    out,
+                })
             })
-            .count()
+            .sum()
     }
 }
 
-/// Numbers of a [`NodeAffine`]: its turn column by column, then its shift.
-type Numbers = [f32; 12];
+/// Vertices that are moved one after another.
+const CHUNK: usize = 256;
 
-fn numbers(affine: &NodeAffine) -> Numbers {
-    let (turn, shift) = (affine.turn.as_slice(), affine.shift.as_slice());
-    std::array::from_fn(|k| if k < 9 { turn[k] } else { shift[k - 9] })
+/// Moves some vertices, by vector instructions.
+struct MoveVertices<'a> {
+    deformer: &'a SkinDeformer,
+    binding: &'a SkinBinding,
+    /// As in [`SkinDeformer::deform_where`].
+    moved: u64,
+    /// The first of them.
+    first: usize,
+    out: &'a mut [Point3<f32>],
 }
 
-/// The displacement that it gives a point. (mm)
-///
-/// Not inlined: the sum that it takes is then built in its own order, four numbers at a time.
-#[inline(never)]
-fn displacement(affine: &Numbers, at: &Point3<f32>) -> Vector3<f32> {
-    let [x, y, z] = [at.x, at.y, at.z];
-    let axis = |k: usize| affine[k] * x + affine[3 + k] * y + affine[6 + k] * z + affine[9 + k];
-    Vector3::new(axis(0), axis(1), axis(2))
+impl pulp::WithSimd for MoveVertices<'_> {
+    /// How many were moved.
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> usize {
+        let SkinDeformer {
+            affines,
+            movers,
+            rest,
+            ..
+        } = self.deformer;
+        let mut count = 0;
+        for (vertex, out) in (self.first..).zip(self.out) {
+            if self.moved != u64::MAX && movers[vertex] & self.moved == 0 {
+                continue;
+            }
+            // Maps are summed as numbers, so that one is applied a vertex, not one a node. A product
+            // and a sum, never both at once: the bits are the same for all instructions.
+            let registers = NUMBERS / S::F32_LANES;
+            let mut sum = [simd.splat_f32s(0.0); NUMBERS];
+            for (node, weight) in self.binding.row(vertex) {
+                let (affine, _) = S::as_simd_f32s(&affines[node as usize].0);
+                let weight = simd.splat_f32s(weight);
+                for k in 0..registers {
+                    sum[k] = simd.add_f32s(sum[k], simd.mul_f32s(affine[k], weight));
+                }
+            }
+            let mut numbers = Numbers::default();
+            let sum: &[f32] = bytemuck::cast_slice(&sum[..registers]);
+            numbers.0.copy_from_slice(sum);
+            *out = rest[vertex] + numbers.displacement(&rest[vertex]);
+            count += 1;
+        }
+        count
+    }
+}
+
+/// Numbers of a [`NodeAffine`], and as many more as fill registers of any width.
+const NUMBERS: usize = 16;
+
+/// A [`NodeAffine`]: its turn column by column, then its shift. Each lies in a line of the cache.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+struct Numbers([f32; NUMBERS]);
+
+impl From<NodeAffine> for Numbers {
+    fn from(affine: NodeAffine) -> Self {
+        let mut numbers = Self::default();
+        numbers.0[..9].copy_from_slice(affine.turn.as_slice());
+        numbers.0[9..12].copy_from_slice(affine.shift.as_slice());
+        numbers
+    }
+}
+
+impl Numbers {
+    /// The displacement that it gives a point. (mm)
+    #[inline(always)]
+    fn displacement(&self, at: &Point3<f32>) -> Vector3<f32> {
+        let ([x, y, z], n) = ([at.x, at.y, at.z], &self.0);
+        let axis = |k: usize| n[k] * x + n[3 + k] * y + n[6 + k] * z + n[9 + k];
+        Vector3::new(axis(0), axis(1), axis(2))
+    }
 }
 
 /// What moves each vertex.
@@ -302,4 +359,72 @@ fn corners<'a>(points: impl Iterator<Item = &'a Point3<f32>>) -> [Point3<f32>; 8
             _ => high[axis],
         }))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::WithSimd;
+
+    #[test]
+    fn bits_are_those_of_one_number_after_another() {
+        let grid = GridShape {
+            u_count: 9,
+            v_count: 7,
+            is_periodic: false,
+        };
+        let wave = |k: usize| ((k * k) as f32 * 0.37).sin();
+        let nodes: Vec<Point3<f32>> = (0..grid.node_count())
+            .map(|i| Point3::new((i % 9) as f32, (i / 9) as f32, wave(i)))
+            .collect();
+        let now: Vec<Point3<f32>> = (nodes.iter().enumerate())
+            .map(|(i, p)| p + Vector3::new(wave(3 * i), wave(5 * i), wave(7 * i)))
+            .collect();
+        let vertex_count = 2 * CHUNK + 5;
+        let row = |v: usize| (0..1 + v % 13).map(move |k| ((v + 5 * k) % 64) as u32);
+        let entries: Vec<u32> = (0..vertex_count).flat_map(row).collect();
+        let mut starts = vec![0];
+        for v in 0..vertex_count {
+            starts.push(starts[v] + row(v).count() as u32);
+        }
+        let binding = SkinBinding {
+            node_counts: vec![63],
+            starts,
+            weights: (0..entries.len()).map(|k| 0.1 + 0.08 * wave(k)).collect(),
+            nodes: entries,
+        };
+        let rest: Vec<Point3<f32>> = (0..vertex_count)
+            .map(|v| Point3::new(wave(v), wave(v + 9), 2.0))
+            .collect();
+        let patches = vec![(grid, nodes)];
+        let mut deformer = SkinDeformer::new(&binding, patches, rest.clone()).unwrap();
+        let mut out = rest.clone();
+        let mandible = NodeAffine {
+            shift: Vector3::new(0.0, -3.0, 1.0),
+            ..NodeAffine::identity()
+        };
+        deformer
+            .deform(&binding, &[now], mandible, &mut out)
+            .unwrap();
+        let mut scalar = rest.clone();
+        let count = MoveVertices {
+            deformer: &deformer,
+            binding: &binding,
+            moved: u64::MAX,
+            first: 0,
+            out: &mut scalar,
+        }
+        .with_simd(pulp::Scalar);
+        assert_eq!(count, vertex_count);
+        assert_eq!(out, scalar);
+        // And what the documentation of the module says.
+        for (v, (out, rest)) in out.iter().zip(&rest).enumerate() {
+            let sum = binding
+                .row(v)
+                .fold(Vector3::zeros(), |sum, (node, weight)| {
+                    sum + deformer.affines[node as usize].displacement(rest) * weight
+                });
+            assert!((out - rest - sum).norm() < 1e-4, "{v}: {out} {sum}");
+        }
+    }
 }

@@ -10,6 +10,9 @@
 //! missing to one) that give each vertex the motion the shapes give it. A user's vertex takes
 //! the weights of the place on the template where registration put it ([`SkinBinding`]).
 //!
+//! Of what patches do beyond their muscle shapes skin takes what is wide enough for it
+//! ([`SheetFilter`]).
+//!
 //! # Limitations
 //!
 //! Weights of outer skin are convex: a vertex outside the hull of the nodes near it follows
@@ -26,6 +29,7 @@ mod interpolation;
 pub mod kernel;
 mod mirror;
 mod narrow;
+mod sheet_filter;
 mod spread;
 mod stored;
 mod vertex_fit;
@@ -39,4 +43,5 @@ pub use frames::{NodeAffine, NodeFrames};
 pub use interpolation::SmoothInterpolation;
 pub use mirror::NodeMirror;
 pub use narrow::{Footing, NarrowPatch};
+pub use sheet_filter::SheetFilter;
 pub use spread::SkinSpreader;

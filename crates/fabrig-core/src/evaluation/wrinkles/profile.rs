@@ -14,7 +14,7 @@ pub struct WrinkleFigures {
     pub depth_rms: f64,
     /// From the lowest trough to the highest ridge of a line: median over the lines. (mm)
     pub trough_to_ridge: f64,
-    /// The wavelength with the most power; 0 where there is no wave. (mm)
+    /// The wavelength whose slopes have the most power; 0 where there is no wave. (mm)
     pub wavelength: f64,
 }
 

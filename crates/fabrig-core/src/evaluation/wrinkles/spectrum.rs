@@ -5,9 +5,12 @@ use std::f64::consts::TAU;
 /// Wavelengths tried, from two mean steps to the length of the longest line.
 const TRIED: usize = 400;
 
-/// The wavelength with the most power over all lines, each a list of (arc length, height): the
-/// mean wave number of the peak, weighted by power down to half of it, so that it does not hang
-/// on single samples. (mm)
+/// The wavelength whose slopes have the most power over all lines, each a list of (arc length,
+/// height): the mean wave number of the peak, weighted by power down to half of it, so that it does
+/// not hang on single samples. (mm)
+///
+/// Slopes, since light shows them and not heights: a part of the face that comes out as a whole by
+/// more than its folds are deep is no wrinkle.
 ///
 /// Returns `None` for lines that are flat or too short.
 pub(super) fn dominant_wavelength(lines: &[Vec<(f64, f64)>]) -> Option<f64> {
@@ -22,7 +25,8 @@ pub(super) fn dominant_wavelength(lines: &[Vec<(f64, f64)>]) -> Option<f64> {
     let powers: Vec<(f64, f64)> = (0..TRIED)
         .map(|k| {
             let number = lowest + (highest - lowest) * k as f64 / (TRIED - 1) as f64;
-            (number, lines.iter().map(|line| power(line, number)).sum())
+            let heights: f64 = lines.iter().map(|line| power(line, number)).sum();
+            (number, heights * number * number)
         })
         .collect();
     let (peak, most) = powers
@@ -79,6 +83,15 @@ mod tests {
                 "{found} {wavelength}"
             );
         }
+        // Twice as high, four times as long: half as steep.
+        let line: Vec<(f64, f64)> = (0..81)
+            .map(|k| {
+                let s = 0.75 * f64::from(k);
+                (s, (TAU * s / 6.0).sin() + 2.0 * (TAU * s / 24.0).sin())
+            })
+            .collect();
+        let found = dominant_wavelength(&[line]).unwrap();
+        assert!((found / 6.0 - 1.0).abs() < 0.04, "{found}");
         let flat = vec![(0..20).map(|k| (f64::from(k), 0.0)).collect::<Vec<_>>()];
         assert_eq!(dominant_wavelength(&flat), None);
     }

@@ -32,7 +32,8 @@
 //! [`MEMORY`]: one sweep per substep leaves an error of first order in the substep, as large as
 //! what the cloth does against its muscle shapes. X is the largest of any patch that is awake, of
 //! `|(u, v / w0)|` before the frame and what the acceleration of shapes and fields adds in it. K
-//! is measured, over takes and random scenes, not proven. Where it was not measured no substep is
+//! is measured, over takes and random scenes, not proven; frames longer than 1/60 s, in which more can
+//! begin, count as many times. Where it was not measured no substep is
 //! spared: in other modes, with loose skin (wrinkle maps, rest lengths that stay neutral), with
 //! other materials, and in a *storm*, where a patch is further from its shapes than [`STORM`] or the
 //! wind is as strong: there it buckles, and a difference as small as rounding grows.

@@ -210,9 +210,11 @@ impl Thrift {
         });
         let awake = of_cloth().filter(|(_, own)| !asleep[*own]);
         let reach = awake.map(|(p, _)| weighed[p][0]).fold(0.0, f64::max);
+        // What moves in a long frame was not to be seen before it.
+        let longer = (now.dt * 60.0).max(1.0);
         let sparing = |s: u32| {
             let gap = 1.0 / f64::from(s) - 1.0 / f64::from(now.full);
-            SUBSTEP_ERROR * gap * reach
+            SUBSTEP_ERROR * longer * gap * reach
         };
         // BDF2 takes a step of at most twice the one before.
         let least = self.substeps.div_ceil(2).min(now.full);

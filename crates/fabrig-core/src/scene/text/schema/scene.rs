@@ -37,6 +37,11 @@ pub(in crate::scene::text) const SCENE: &[Key] = &[
         Kind::Word(&["shapes", "tracked"]),
         "\"tracked\": turned by the take's eye rotations, where it has them",
     ),
+    Key::new(
+        "skin_smoothing",
+        from_to(0.0, 50.0),
+        "width over which skin averages what patches do beyond their muscle shapes (mm)",
+    ),
     Key::optional(
         "fps",
         positive(1e4),
@@ -199,8 +204,14 @@ pub(super) const FACE: &[Key] = &[
     Key::required(
         "rig",
         Kind::Path,
-        "as `fabrig rig` makes it",
+        "as `fabrig rig` makes it, or a mesh, which is rigged first",
         "\"face.fabrig\"",
+    ),
+    Key::optional(
+        "resolution",
+        Kind::Text,
+        "patches of a mesh: coarse, standard, fine, finest, an accuracy (0.3mm) or view size (900px)",
+        "\"standard\"",
     ),
     Key::optional(
         "motion",
