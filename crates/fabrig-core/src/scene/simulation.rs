@@ -112,6 +112,8 @@ pub struct Simulation {
     thrift: Option<Thrift>,
     /// Patches that moved since the skin did.
     has_moved: Vec<bool>,
+    /// How far each patch is from its muscle shapes: sum of squares and largest. (mm^2, mm)
+    settled: Vec<[f64; 2]>,
     /// Whether the skin is as the last frame left it.
     has_skin: bool,
     skin_moved: usize,
@@ -199,6 +201,7 @@ impl Simulation {
             pose: FacePose::neutral(rig.shape_names.len()),
             modelled,
             has_moved: vec![true; count],
+            settled: vec![[0.0; 2]; count],
             has_skin: false,
             skin_moved: 0,
             skin_slack: thrift.as_ref().map_or(0.0, Thrift::skin_slack),
@@ -262,6 +265,7 @@ impl Simulation {
             thrift.reset(&self.scene.cloth);
         }
         self.has_skin = false;
+        self.settled.fill([0.0; 2]);
     }
 
     /// Goes `dt` seconds on along the clip.
@@ -330,7 +334,10 @@ impl Simulation {
 
         self.time += dt;
         report.time = self.time;
-        (report.settle_rms, report.settle_max) = self.settle_error();
+        for patch in (0..self.settled.len()).filter(|&p| self.has_moved[p]) {
+            self.settled[patch] = self.settled_now(patch);
+        }
+        (report.settle_rms, report.settle_max) = self.settle_of(self.settled.iter().copied());
         Ok(report)
     }
 
@@ -512,15 +519,26 @@ impl Simulation {
 
     /// Root mean square and largest distance of the nodes from their muscle shapes. (mm)
     pub fn settle_error(&self) -> (f64, f64) {
-        let (mut sum, mut count, mut largest) = (0.0, 0usize, 0.0f64);
-        for (patch, target) in self.targets.iter().enumerate() {
-            for (now, wanted) in self.patch_positions(patch).iter().zip(&target.positions) {
-                let distance = f64::from((now - wanted).norm());
-                sum += distance * distance;
-                largest = largest.max(distance);
-            }
-            count += target.positions.len();
-        }
+        self.settle_of((0..self.targets.len()).map(|patch| self.settled_now(patch)))
+    }
+
+    /// Sum of squares and largest distance of a patch's nodes from its muscle shapes. (mm^2, mm)
+    fn settled_now(&self, patch: usize) -> [f64; 2] {
+        let wanted = &self.targets[patch].positions;
+        let pairs = self.patch_positions(patch).iter().zip(wanted);
+        let (sum, largest) = pairs.fold((0.0f64, 0.0f32), |(sum, largest), (now, wanted)| {
+            let squared = (now - wanted).norm_squared();
+            (sum + f64::from(squared), largest.max(squared))
+        });
+        [sum, f64::from(largest).sqrt()]
+    }
+
+    /// Root mean square and largest of what patches are.
+    fn settle_of(&self, patches: impl Iterator<Item = [f64; 2]>) -> (f64, f64) {
+        let count: usize = self.targets.iter().map(|t| t.positions.len()).sum();
+        let (sum, largest) = patches.fold((0.0, 0.0f64), |(sum, largest), [squares, most]| {
+            (sum + squares, largest.max(most))
+        });
         ((sum / count.max(1) as f64).sqrt(), largest)
     }
 
