@@ -276,7 +276,8 @@ mod tests {
         for way in as_one {
             assert!((way - Vector3::new(1.0, -2.0, 3.0)).norm() < 1e-5, "{way}");
         }
-        let sign = |u: usize, v: usize| if (u / 2 + v / 2) % 2 == 0 { 1.0 } else { -1.0 };
+        let is_up = |u: usize, v: usize| (u / 2 + v / 2).is_multiple_of(2);
+        let sign = |u: usize, v: usize| if is_up(u, v) { 1.0 } else { -1.0 };
         let folds = passed(GRID, 1.0, |u, v| Vector3::z() * sign(u, v));
         for v in 4..12 {
             for u in 4..60 {
