@@ -147,6 +147,7 @@ fn rigs() {
 #[test]
 fn scenes() {
     let case = Case::new();
+    case.file("junk.fabrig", "no rig at all");
     for (name, content, parts) in [
         (
             "key.toml",
@@ -171,6 +172,11 @@ fn scenes() {
         (
             "rig.toml",
             "[[faces]]\nrig = \"range.toml\"\n",
+            &["line 2, column 7", "`faces[0].rig`", "unknown mesh format"],
+        ),
+        (
+            "junk.toml",
+            "[[faces]]\nrig = \"junk.fabrig\"\n",
             &["line 2, column 7", "`faces[0].rig`", "not a rig file"],
         ),
         ("broken.toml", "fps = = 3\n", &["line 1, column 7"]),
