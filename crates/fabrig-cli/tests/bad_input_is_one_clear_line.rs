@@ -172,7 +172,7 @@ fn scenes() {
         (
             "rig.toml",
             "[[faces]]\nrig = \"range.toml\"\n",
-            &["line 2, column 7", "`faces[0].rig`", "unknown mesh format"],
+            &["line 2, column 7", "`faces[0].rig`", "not a rig file"],
         ),
         (
             "junk.toml",

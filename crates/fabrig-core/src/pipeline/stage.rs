@@ -17,15 +17,12 @@ use super::{
 use crate::Error;
 use crate::edit::{Edits, edits_path};
 use crate::facs::nearest_name;
-use crate::mesh::io::read_mesh;
+use crate::mesh::io::{is_mesh_file, read_mesh};
 use crate::motion::{self, Clip, ReadOptions};
 use crate::registration::Progress;
 use crate::rig::Rig;
 use crate::scene::{Scene, SceneError, Simulation};
 use crate::template::human;
-
-/// What the files of rigs end in.
-const RIG_EXTENSION: &str = "fabrig";
 
 /// A face of a scene with its files read.
 #[derive(Debug, Clone)]
@@ -108,7 +105,7 @@ fn load_face(
             .into())
     };
     let rig_path = file("rig", &face.rig)?;
-    let is_mesh = rig_path.extension().is_some_and(|e| e != RIG_EXTENSION);
+    let is_mesh = is_mesh_file(&rig_path);
     let detail = detail_of(scene, index, is_mesh)?;
     let mut rig = if is_mesh {
         let key = (rig_path.clone(), face.resolution.clone());

@@ -20,6 +20,6 @@ pub(crate) use obj::logical_lines;
 
 pub use error::{MeshIoError, ObjProblem};
 pub use obj::parse_obj;
-pub use read::read_mesh;
+pub use read::{is_mesh_file, read_mesh};
 pub use shapes::{MeshShape, MeshWithShapes, read_mesh_with_shapes};
 pub use write::write_obj;

@@ -18,25 +18,37 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, MeshIoError> {
     Ok(read(path.as_ref())?.mesh)
 }
 
-/// The mesh with its shapes.
-pub(super) fn read(path: &Path) -> Result<MeshWithShapes, MeshIoError> {
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_ascii_lowercase())
-        .unwrap_or_default();
-    type Parse = fn(&[u8], &Path) -> Result<MeshWithShapes, MeshIoError>;
-    let parse: Parse = match extension.as_str() {
+/// Whether a file is of a kind that [`read_mesh`] reads, by its name.
+pub fn is_mesh_file(path: impl AsRef<Path>) -> bool {
+    parser_of(&extension_of(path.as_ref())).is_some()
+}
+
+type Parse = fn(&[u8], &Path) -> Result<MeshWithShapes, MeshIoError>;
+
+fn extension_of(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
+}
+
+fn parser_of(extension: &str) -> Option<Parse> {
+    Some(match extension {
         // Names may be in any encoding; everything that matters is ASCII.
         "obj" => |bytes, path| Ok(obj::parse_obj(&String::from_utf8_lossy(bytes), path)?.into()),
         "ply" => |bytes, path| Ok(ply::parse_ply(bytes, path)?.into()),
         "stl" => |bytes, path| Ok(stl::parse_stl(bytes, path)?.into()),
         "gltf" | "glb" => gltf::parse_gltf,
-        _ => {
-            return Err(MeshIoError::UnknownFormat {
-                path: path.to_owned(),
-                extension,
-            });
-        }
+        _ => return None,
+    })
+}
+
+/// The mesh with its shapes.
+pub(super) fn read(path: &Path) -> Result<MeshWithShapes, MeshIoError> {
+    let extension = extension_of(path);
+    let Some(parse) = parser_of(&extension) else {
+        return Err(MeshIoError::UnknownFormat {
+            path: path.to_owned(),
+            extension,
+        });
     };
     let bytes = std::fs::read(path).map_err(|source| MeshIoError::Read {
         path: path.to_owned(),
