@@ -28,6 +28,7 @@ mod error;
 pub mod evaluation;
 pub mod export;
 pub mod facs;
+pub mod machine;
 pub mod mesh;
 pub mod motion;
 pub mod pipeline;

@@ -11,10 +11,11 @@ mod faces;
 use std::sync::Arc;
 
 use fabrig_core::collision::{Collider, ColliderFrame, ColliderShape, PairMask, Stickiness};
+use fabrig_core::mesh::Surface;
 use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::scene::{Scene, Simulation};
 use fabrig_core::{Point, Vector};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Unit};
 
 #[test]
 fn lips_and_lids_do_not_cross_however_fast_they_close() {
@@ -205,6 +206,59 @@ fn sealed_lips_stay_sealed_until_the_jaw_pulls_them_apart() {
         again * 3 < sealed,
         "lips that do not touch do not stick again: {again}"
     );
+}
+
+#[test]
+fn lips_and_cheeks_rest_on_teeth_and_gums() {
+    let rig = &faces::demo().rig;
+    let rest = rig.skin_at_rest();
+    let mut is_teeth = vec![false; rest.len()];
+    for part in rig.parts.iter().filter(|p| p.name.contains("teeth")) {
+        for &v in &part.vertices {
+            is_teeth[v as usize] = true;
+        }
+    }
+    let mut triangles = rig.face.triangles();
+    triangles.retain(|t| t.iter().all(|&v| is_teeth[v as usize]));
+    let places: Vec<Point> = rest.iter().map(|p| p.cast()).collect();
+    let teeth = Surface::new(&places, &triangles).unwrap();
+    // How far something is behind the teeth that was before them.
+    let behind = |from: Point, to: Point| {
+        let (direction, length) = Unit::try_new_and_get(to - from, 1e-6)?;
+        let hit = teeth.cast_ray(&from, &direction, length)?;
+        Some(length - hit.distance)
+    };
+    // Three times its weight presses the face against its teeth.
+    let pressed = |bones: bool| {
+        let text =
+            format!("gravity = [0, -9810, -30000]\n[contact]\npairs = \"all\"\nbones = {bones}\n");
+        let scene = Scene::from_toml(&text).unwrap();
+        let mut simulation = Simulation::new(Arc::clone(rig), scene, None).unwrap();
+        for _ in 0..40 {
+            simulation.advance(1.0 / 60.0).unwrap();
+        }
+        let nodes = rig.patches.iter().enumerate().flat_map(|(p, patch)| {
+            let now = simulation.patch_positions(p).iter();
+            patch.patch.neutral.iter().zip(now).collect::<Vec<_>>()
+        });
+        let nodes: Vec<f64> = nodes
+            .filter_map(|(from, to)| behind(*from, to.cast()))
+            .collect();
+        let skin = rest.iter().zip(simulation.skin()).zip(&is_teeth);
+        let skin = skin.filter(|(_, is_teeth)| !**is_teeth);
+        let skin = skin.filter_map(|((from, to), _)| behind(from.cast(), to.cast()));
+        (nodes, skin.fold(0.0, f64::max))
+    };
+    let (nodes, skin) = pressed(false);
+    assert!(
+        nodes.len() > 50 && skin > 1.0,
+        "{} nodes, {skin} mm",
+        nodes.len()
+    );
+    let (nodes, skin) = pressed(true);
+    let deepest = nodes.iter().copied().fold(0.0, f64::max);
+    assert!(deepest < 0.1, "{} nodes, {deepest} mm", nodes.len());
+    assert!(skin < 0.1, "{skin} mm of skin");
 }
 
 /// Every frame of the real take with everything that may touch, judged; minutes.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use fabrig_core::atomic_file::write_atomically;
-use fabrig_core::cloth::instruction_set;
+use fabrig_core::machine::instruction_set;
 use fabrig_core::motion::parse_keys;
 use fabrig_core::pipeline::{AnimateOptions, animate};
 use fabrig_core::recording::RecordingReader;

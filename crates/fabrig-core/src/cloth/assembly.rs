@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup};
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, Precision};
-use super::lanes::{F32x4, F32x8, F64x8, Real};
+use crate::machine::{F32x4, F32x8, F64x8, Real};
 
 /// Where a patch is, and what its input must look like.
 #[derive(Debug, Clone, Copy)]

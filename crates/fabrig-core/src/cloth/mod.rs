@@ -72,7 +72,6 @@ mod guard;
 mod hook;
 mod hooked;
 mod input;
-mod lanes;
 mod linear;
 mod materials;
 mod report;
@@ -84,8 +83,7 @@ mod validate;
 mod tests;
 
 pub use error::ClothError;
-pub use group::instruction_set;
-pub use hook::{HookSubstep, SubstepHook};
+pub use hook::{HookSubstep, MovedNode, SubstepHook};
 pub use input::{
     ClothAttachment, ClothOptions, ClothPatch, FrameInput, GridShape, HeadMotion, Integrator, Mode,
     NodeVariation, PatchMotion, Precision, STANDING_GRAVITY,
@@ -94,6 +92,3 @@ pub use linear::{LinearCloth, NodeVectors};
 pub use materials::{Material, MaterialError, Materials, TIME_UNIT};
 pub use report::{Counters, Energies, StepReport};
 pub use solver::Cloth;
-
-pub(crate) use group::vectorized;
-pub(crate) use lanes::{F32x8, Real, Vec3};

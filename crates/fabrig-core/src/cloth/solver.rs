@@ -12,6 +12,7 @@ use super::hooked::{SeenNodes, advance_hooked};
 use super::input::{ClothOptions, ClothPatch, FrameInput, HeadMotion, PatchMotion};
 use super::report::{Energies, StepReport};
 use super::validate;
+use crate::machine::among_workers;
 
 /// Substeps of a long frame are at most this many times those of 1/60 s.
 const LONGEST_FRAME: u32 = 8;
@@ -177,10 +178,12 @@ impl Cloth {
             .collect();
         let wanted = nodes.clone();
         hook.reset(&mut nodes);
-        seen.for_each(hook.moved(), |at, node, i| {
+        for moved in hook.moved() {
+            let (at, node) = seen.place_of(moved.node);
+            let i = moved.node as usize;
             let offset = [0, 1, 2].map(|k| f64::from(nodes[i][k]) - f64::from(wanted[i][k]));
             self.groups[at.group].place(at.lane, node, offset);
-        });
+        }
         self.write_positions();
         Ok(())
     }
@@ -205,7 +208,7 @@ impl Cloth {
     /// [`ClothError`] for counts that do not match, numbers that are not finite, and a time
     /// step that is not positive; the cloth is then unchanged.
     pub fn step(&mut self, input: &FrameInput<'_>) -> Result<StepReport, ClothError> {
-        self.step_hooked(input, None)
+        among_workers(|| self.step_hooked(input, None))
     }
 
     /// As [`Cloth::step`], with `hook` moving nodes at the end of every substep.

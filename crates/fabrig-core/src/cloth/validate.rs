@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::assembly::PatchLayout;
 use super::error::ClothError;
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, FrameInput, PatchMotion};
+use crate::machine::vectorized;
 
 /// Largest coordinate. (mm)
 const FARTHEST: f32 = 1e6;
@@ -267,8 +268,8 @@ fn motion(
     }
     let (positions, velocities) = (&motion.positions, &motion.velocities);
     // All in one go, without branches; only where something is wrong it is looked for.
-    let farthest = largest_bits(positions.iter().map(|p| p.coords.as_ref()));
-    let fastest = largest_bits(velocities.iter().map(|v| v.as_ref()));
+    let farthest = largest_bits(bytemuck::cast_slice(positions));
+    let fastest = largest_bits(bytemuck::cast_slice(velocities));
     if farthest <= FARTHEST.to_bits() && fastest <= FASTEST.to_bits() {
         return Ok(());
     }
@@ -287,15 +288,20 @@ fn motion(
 }
 
 /// Bits of the largest size of any number: ordered as sizes are, NaN beyond all of them.
-#[inline(always)]
-fn largest_bits<'a>(vectors: impl Iterator<Item = &'a [f32; 3]>) -> u32 {
-    let mut largest = [0; 3];
-    for v in vectors {
-        for axis in 0..3 {
-            largest[axis] = largest[axis].max(v[axis].abs().to_bits());
-        }
+fn largest_bits(numbers: &[f32]) -> u32 {
+    vectorized(LargestBits(numbers))
+}
+
+struct LargestBits<'a>(&'a [f32]);
+
+impl pulp::NullaryFnOnce for LargestBits<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn call(self) -> u32 {
+        let sizes = self.0.iter().map(|x| x.abs().to_bits());
+        sizes.fold(0, u32::max)
     }
-    largest[0].max(largest[1]).max(largest[2])
 }
 
 fn values(

@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::distance::PairKind;
 use super::tile::{Tile, Way, least, most};
-use crate::cloth::vectorized;
+use crate::machine::vectorized;
 
 /// A slab this much wider than needed makes any length superfluous. (mm)
 const AMPLE: f32 = 0.3;

@@ -12,7 +12,7 @@ use super::project::Active;
 use super::tile::{Extent, Way, most};
 use super::tile_shape::flat_way;
 use crate::Vector;
-use crate::cloth::vectorized;
+use crate::machine::vectorized;
 
 /// A slab this much wider than the thickness needs no wider one. (mm)
 const WIDE_ENOUGH: f32 = 1.0;

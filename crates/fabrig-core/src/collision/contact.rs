@@ -15,7 +15,7 @@ use super::{
     Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
 };
 use crate::anatomy::GridShape;
-use crate::cloth::{HookSubstep, SubstepHook};
+use crate::cloth::{HookSubstep, MovedNode, SubstepHook};
 
 /// Furthest that a node or a collider goes in one pass. (mm)
 pub(super) const PASS_LENGTH: f64 = 1.0;
@@ -111,8 +111,9 @@ pub struct Contact {
     pub(super) is_touched: Vec<bool>,
     pub(super) carried_by: Vec<u32>,
     pub(super) has_carried: bool,
-    /// Nodes that the last call moved, and where to.
-    pub(super) moved: Vec<(u32, Point3<f32>)>,
+    pub(super) moved: Vec<MovedNode>,
+    /// Where everything was before a substep of several passes. (mm)
+    pub(super) departed: Vec<Point3<f32>>,
     pub(super) stopped: Vec<bool>,
     pub(super) points: Vec<ContactPoint>,
     pub(super) report: ContactReport,
@@ -247,6 +248,7 @@ impl Contact {
             carried_by: vec![u32::MAX; cloth_count],
             has_carried: false,
             moved: Vec::new(),
+            departed: Vec::new(),
             points: Vec::new(),
             report: ContactReport {
                 forces,
@@ -316,6 +318,11 @@ impl Contact {
     fn walk(&mut self, goal: &[Point3<f32>], progress: [f64; 2], force_per_shift: f64) -> usize {
         let furthest = self.longest_way(goal, progress);
         let passes = ((furthest / PASS_LENGTH).ceil() as usize).clamp(1, MOST_PASSES);
+        self.departed.clear();
+        if passes > 1 {
+            self.departed
+                .extend_from_slice(&self.positions[..self.cloth_count]);
+        }
         self.points.clear();
         for f in &mut self.report.forces {
             *f = crate::Vector::zeros();
@@ -390,9 +397,16 @@ impl Contact {
         self.altered.clear();
         let passes = self.walk(goal, progress, force_per_shift);
         self.moved.clear();
-        let moved = |i: u32| {
-            let x = self.positions[i as usize];
-            (x != goal[i as usize]).then_some((i, x))
+        // A pass leaves in `wanted` where it began.
+        let departed = if passes == 1 {
+            &self.wanted
+        } else {
+            &self.departed
+        };
+        let moved = |node: u32| {
+            let i = node as usize;
+            let (from, to) = (departed[i], self.positions[i]);
+            (to != goal[i]).then_some(MovedNode { node, from, to })
         };
         if passes == 1 {
             self.altered.sort_unstable();
@@ -455,7 +469,11 @@ impl SubstepHook for Contact {
         }
     }
 
-    fn moved(&self) -> &[(u32, Point3<f32>)] {
+    fn stride(&self) -> u32 {
+        self.options.every
+    }
+
+    fn moved(&self) -> &[MovedNode] {
         &self.moved
     }
 

@@ -39,7 +39,7 @@ impl Default for Stickiness {
         Self {
             gap: 0.5,
             break_gap: 6.0,
-            strength: 0.003,
+            strength: 0.0022,
             rows: 3,
         }
     }
@@ -60,6 +60,9 @@ pub struct ContactOptions {
     pub eye_friction: f64,
     /// Whether eyeballs, teeth and gums hold patches out.
     pub bones: bool,
+    /// Substeps from one pass of contact to the next, at most: every frame ends with one, and
+    /// what goes far in them is followed in several. The cloth between is solved without.
+    pub every: u32,
     /// Whether lips stick, and how; none: they do not.
     pub sticky_lips: Option<Stickiness>,
 }
@@ -72,6 +75,7 @@ impl Default for ContactOptions {
             friction: 0.2,
             eye_friction: 0.05,
             bones: true,
+            every: 3,
             sticky_lips: None,
         }
     }
@@ -88,6 +92,7 @@ impl ContactOptions {
             ("thickness", self.thickness, 1e-3, 2.0),
             ("friction", self.friction, 0.0, 10.0),
             ("eye_friction", self.eye_friction, 0.0, 10.0),
+            ("every", f64::from(self.every), 1.0, 64.0),
         ];
         if let Some(s) = &self.sticky_lips {
             ranges.extend([

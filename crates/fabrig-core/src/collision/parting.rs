@@ -11,7 +11,7 @@ use nalgebra::Point3;
 
 use super::certificate::ROUNDING;
 use super::distance::PairKind;
-use crate::cloth::{F32x8, Real, Vec3, vectorized};
+use crate::machine::{F32x8, Real, Vec3, vectorized};
 
 /// What planes between the elements of pairs show, one entry each.
 #[derive(Debug, Clone, Default)]

@@ -73,6 +73,13 @@ impl StarSurface {
         if a == b { a } else { a + (b - a) * t }
     }
 
+    /// Distance of a point from the surface, negative inside; infinite where there is none.
+    ///
+    /// - `point`: from the centre (mm)
+    pub fn distance(&self, point: &Vector) -> f64 {
+        self.nearest(point).distance
+    }
+
     /// The surface near a point in the body's own coordinates. (mm)
     pub(crate) fn nearest(&self, point: &Vector) -> SurfacePlace {
         let length = point.norm();

@@ -4,6 +4,8 @@
     reason = "a test that cannot go on should fail there"
 )]
 
+mod strides;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{Collider, ColliderShape, Contact, ContactOptions, ContactPatch, PairMask, Verdict};
@@ -87,8 +89,8 @@ impl Scene {
                 effective_mass: 1.2,
             };
             self.contact.correct(&substep, &self.positions);
-            for &(i, to) in self.contact.moved() {
-                self.positions[i as usize] = to;
+            for moved in self.contact.moved() {
+                self.positions[moved.node as usize] = moved.to;
             }
             for (v, (x, o)) in self
                 .velocities

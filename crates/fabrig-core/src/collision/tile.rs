@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::mesh::Part;
 use super::tree::Tree;
 use crate::Vector;
-use crate::cloth::vectorized;
+use crate::machine::vectorized;
 
 /// Cells along an edge of a tile of a grid.
 const GRID_CELLS: u32 = 4;

@@ -4,7 +4,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::tile::{Extent, Tile, least, most};
-use crate::cloth::vectorized;
+use crate::machine::vectorized;
 
 /// Most cells of a tile.
 pub(super) const MOST_CELLS: usize = 16;

@@ -9,10 +9,13 @@ use crate::collision::{
 };
 use crate::rig::Rig;
 use crate::scene::Scene;
-use crate::scene::bodies::Eyeball;
+use crate::scene::bodies::Body;
 use crate::scene::modelled::Modelled;
+use crate::template::RigidBody;
 use nalgebra::Point3;
 
+/// Patches that come so near to a jaw at rest may meet it. (mm)
+const JAW_REACH: f64 = 15.0;
 /// Deeper nodes than this are covered no more: the tissue over them gives way. (mm)
 const DEEPEST_COVER: f64 = 5.0;
 
@@ -24,7 +27,8 @@ pub(super) struct FaceContact {
     set_poses: Vec<Option<Isometry3<f64>>>,
     /// Poses now, in the head frame. (mm)
     poses: Vec<Isometry3<f64>>,
-    centers: [Isometry3<f64>; 2],
+    /// What each body of the face moves with, and its pose at rest.
+    bodies: Vec<(RigidBody, Isometry3<f64>)>,
 }
 
 impl FaceContact {
@@ -36,7 +40,7 @@ impl FaceContact {
         scene: &Scene,
         patches: &[ClothPatch],
         modelled: &Modelled,
-        eyeballs: &[Eyeball; 2],
+        bodies: &[Body],
     ) -> Result<Option<Self>, CollisionError> {
         scene.contact.check()?;
         if !scene.has_contact() {
@@ -70,40 +74,39 @@ impl FaceContact {
                     is_mouth: is_mouth_ring(chart),
                     node_mass: scene.cloth.areal_density * cloth.material.mass * cloth.area()
                         / cloth.rest.len() as f64,
-                    bodies: match (is_ring, chart.side) {
-                        (true, Side::Left) => vec![0],
-                        (true, Side::Right) => vec![1],
-                        _ => Vec::new(),
-                    },
+                    bodies: (0..bodies.len())
+                        .filter(|&b| may_meet(&bodies[b], chart, &cloth.rest))
+                        .collect(),
                 }
             })
             .collect();
-        let bodies: Vec<ContactBody> = eyeballs
+        let of_bodies: Vec<ContactBody> = bodies
             .iter()
-            .map(|ball| ContactBody {
-                surface: ball.surface.clone(),
+            .map(|body| ContactBody {
+                surface: body.surface.clone(),
+                // Both are wet.
                 friction: scene.contact.eye_friction,
-                rest: ball.rest(),
+                rest: body.rest(),
             })
             .collect();
-        let contact = Contact::new(&of_contact, &bodies, &scene.colliders, &scene.contact)?;
+        let contact = Contact::new(&of_contact, &of_bodies, &scene.colliders, &scene.contact)?;
         Ok(Some(Self {
             contact,
             set_poses: vec![None; scene.colliders.len()],
             poses: vec![Isometry3::identity(); scene.colliders.len()],
             colliders: scene.colliders.clone(),
-            centers: eyeballs.each_ref().map(Eyeball::rest),
+            bodies: bodies.iter().map(|b| (b.follows, b.rest())).collect(),
         }))
     }
 
     /// Says where everything is at the end of the next frame.
     ///
-    /// - `eyes`: what the eyeballs do against rest [mm, head frame]
+    /// - `moved`: what a body of the face does against rest [mm, head frame]
     pub(super) fn begin_frame(
         &mut self,
         time: f64,
         head: &Isometry3<f64>,
-        eyes: [Isometry3<f64>; 2],
+        moved: impl Fn(RigidBody) -> Isometry3<f64>,
     ) {
         for ((pose, collider), set) in self
             .poses
@@ -117,8 +120,9 @@ impl FaceContact {
                 ColliderFrame::Head => own,
             };
         }
-        let eyes = [0, 1].map(|e| eyes[e] * self.centers[e]);
-        self.contact.begin_frame(&eyes, &self.poses);
+        let bodies = self.bodies.iter();
+        let bodies: Vec<_> = bodies.map(|&(body, rest)| moved(body) * rest).collect();
+        self.contact.begin_frame(&bodies, &self.poses);
     }
 
     pub(super) fn set_pose(
@@ -153,6 +157,18 @@ impl FaceContact {
             .zip(self.poses.iter().copied())
             .collect();
         self.contact.judge(positions, &colliders)
+    }
+}
+
+/// Whether a body holds a patch out: eyeballs the ring around them, jaws what lies over them.
+fn may_meet(body: &Body, chart: &PatchChart, rest: &[Point3<f32>]) -> bool {
+    let is_ring = chart.kind == PatchKind::Sphincter;
+    match body.follows {
+        RigidBody::EyeLeft => is_ring && chart.side == Side::Left,
+        RigidBody::EyeRight => is_ring && chart.side == Side::Right,
+        RigidBody::Skull | RigidBody::Mandible => {
+            rest.iter().any(|node| body.distance(node) < JAW_REACH)
+        }
     }
 }
 

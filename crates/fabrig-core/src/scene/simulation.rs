@@ -15,10 +15,11 @@ use crate::cloth::{
     Cloth, ClothAttachment, ClothPatch, FrameInput, HeadMotion, Materials, PatchMotion, StepReport,
 };
 use crate::collision::{CollisionError, ContactPoint, ContactReport, Verdict};
+use crate::machine::among_workers;
 use crate::motion::{Clip, EyeAngles, Sample};
 use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
-use crate::scene::bodies::{Eyeball, eyeballs};
+use crate::scene::bodies::{Body, bodies};
 use crate::scene::contact::FaceContact;
 use crate::scene::economy::{EconomyReport, Thrift};
 use crate::scene::fields::{Curve, Fields, HeadDrive};
@@ -129,7 +130,8 @@ pub struct Simulation {
     contact: Option<FaceContact>,
     skin_contact: Option<SkinContact>,
     skin_report: SkinContactReport,
-    eyeballs: [Eyeball; 2],
+    /// What holds patches and skin out; none where nothing touches.
+    bodies: Vec<Body>,
     evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
@@ -168,11 +170,15 @@ impl Simulation {
             Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
             Dynamics::None => None,
         };
-        let eyeballs = eyeballs(&rig);
-        let mut contact = FaceContact::new(&rig, &scene, &patches, &modelled, &eyeballs)?;
+        let bodies = if scene.has_contact() {
+            bodies(&rig)
+        } else {
+            Vec::new()
+        };
+        let mut contact = FaceContact::new(&rig, &scene, &patches, &modelled, &bodies)?;
         let skin_sheet = SkinSheet::new(&rig, &scene, &modelled);
         let skin = rig.skin_at_rest();
-        let skin_contact = SkinContact::new(&rig, &scene, &eyeballs, &skin)?;
+        let skin_contact = SkinContact::new(&rig, &scene, &bodies, &skin)?;
         if let (Some(of_cloth), Some(of_skin)) = (&mut contact, &skin_contact) {
             of_cloth.contact.set_lips(of_skin.sticky_lips());
         }
@@ -220,7 +226,7 @@ impl Simulation {
             contact,
             skin_contact,
             skin_report: SkinContactReport::default(),
-            eyeballs,
+            bodies,
             evaluated: vec![(Vec::new(), Vec::new()); count],
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
@@ -275,9 +281,11 @@ impl Simulation {
     /// [`SceneError`] for a time step that is not positive; the face is then unchanged.
     pub fn advance(&mut self, dt: f64) -> Result<FrameReport, SceneError> {
         check_dt(dt)?;
-        self.look_ahead(dt);
-        let pose = self.pose_at(self.time + dt);
-        self.take_frame(pose, dt)
+        among_workers(|| {
+            self.look_ahead(dt);
+            let pose = self.pose_at(self.time + dt);
+            self.take_frame(pose, dt)
+        })
     }
 
     /// Goes `dt` seconds on to a pose that the caller gives: for live input.
@@ -291,7 +299,7 @@ impl Simulation {
         if let Some(thrift) = &mut self.thrift {
             thrift.forget_ahead();
         }
-        self.take_frame(pose, dt)
+        among_workers(|| self.take_frame(pose, dt))
     }
 
     fn take_frame(&mut self, pose: FacePose, dt: f64) -> Result<FrameReport, SceneError> {
@@ -585,9 +593,9 @@ impl Simulation {
     }
 
     fn begin_contact(&mut self, time: f64) {
-        let eyes = [0, 1].map(|e| self.eye(e));
-        if let Some(contact) = &mut self.contact {
-            contact.begin_frame(time, &self.world, eyes);
+        if let Some(mut contact) = self.contact.take() {
+            contact.begin_frame(time, &self.world, |body| self.body(body));
+            self.contact = Some(contact);
         }
     }
 
@@ -614,10 +622,11 @@ impl Simulation {
             self.skin_moved = self.skin.len();
         }
         self.has_skin = true;
-        let eyes = [0, 1].map(|e| self.eye(e) * self.eyeballs[e].rest());
+        let bodies = self.bodies.iter();
+        let bodies: Vec<_> = bodies.map(|b| self.body(b.follows) * b.rest()).collect();
         if let Some(contact) = &mut self.skin_contact {
             let colliders = self.contact.as_ref().map_or(&[][..], |c| c.poses());
-            self.skin_report = contact.settle(&mut self.skin, colliders, &eyes);
+            self.skin_report = contact.settle(&mut self.skin, colliders, &bodies);
             if let Some(of_cloth) = &mut self.contact {
                 of_cloth.contact.set_touching(contact.touching(&self.skin));
             }

@@ -2,8 +2,8 @@
 //!
 //! Patches keep apart by contact of their own; the skin hangs on them, and bends less finely
 //! than what it meets. So after it is deformed, the few vertices that are where they must not
-//! be ask to be moved: lips off each other, lids off the eyeball with its cornea, all skin off
-//! colliders. What they ask is spread over the skin around them ([`SkinSpreader`]), so that no
+//! be ask to be moved: lips off each other and off the teeth, lids off the eyeball with its cornea,
+//! all skin off colliders. What they ask is spread over the skin around them ([`SkinSpreader`]), so that no
 //! dent shows, and a few rounds later nothing is left to ask.
 //!
 //! What crossed at rest may stay as deep as it was.
@@ -19,9 +19,10 @@ use crate::collision::{
 };
 use crate::rig::Rig;
 use crate::scene::Scene;
-use crate::scene::bodies::Eyeball;
+use crate::scene::bodies::Body;
 use crate::scene::contact::is_mouth_ring;
 use crate::skin::SkinSpreader;
+use crate::template::RigidBody;
 
 /// Rounds of asking and spreading.
 const ROUNDS: usize = 10;
@@ -38,7 +39,7 @@ const LINING: f32 = 8.0;
 /// Skin further from a node of the ring than its nearest by no more than this tells whether
 /// the lips touch there. (mm)
 const TOUCH_AROUND: f32 = 1.5;
-/// Height that lids keep over the eyeball, where they have it at rest. (mm)
+/// Height that lids keep over the eyeball and lips over teeth, where they have it at rest. (mm)
 const LID_HEIGHT: f32 = 0.15;
 /// What is kept from a collider. (mm)
 const GAP: f32 = 0.02;
@@ -64,7 +65,7 @@ pub(super) struct SkinContact {
     is_skin: Vec<bool>,
     lips: Option<Lips>,
     touch: Option<LipTouch>,
-    lids: Vec<Lids>,
+    over: Vec<Over>,
     shapes: Vec<WorldShape>,
 }
 
@@ -91,11 +92,14 @@ struct LipTouch {
     gap: f32,
 }
 
-struct Lids {
-    eye: usize,
-    ball: WorldShape,
+/// Skin over a body of the face: lids over an eyeball, lips and the lining of the mouth over
+/// teeth and gums.
+struct Over {
+    /// Index of the body.
+    body: usize,
+    shape: WorldShape,
     vertices: Vec<u32>,
-    /// Height over the eyeball that each keeps. (mm)
+    /// Height over the body that each keeps. (mm)
     heights: Vec<f32>,
 }
 
@@ -113,7 +117,7 @@ impl SkinContact {
     pub(super) fn new(
         rig: &Rig,
         scene: &Scene,
-        eyeballs: &[Eyeball; 2],
+        bodies: &[Body],
         rest: &[Point3<f32>],
     ) -> Result<Option<Self>, CollisionError> {
         if !scene.has_contact() {
@@ -133,7 +137,7 @@ impl SkinContact {
             shapes: shapes.collect::<Result<_, _>>()?,
             lips: None,
             touch: None,
-            lids: Vec::new(),
+            over: Vec::new(),
             triangles,
             is_skin,
         };
@@ -144,26 +148,27 @@ impl SkinContact {
             });
         }
         if has_own && scene.contact.bones {
-            for (eye, ball) in eyeballs.iter().enumerate().filter(|(_, b)| b.is_own) {
-                contact.lids.push(Lids::new(rig, eye, ball, rest));
-            }
+            let own = bodies.iter().enumerate().filter(|(_, b)| b.is_own);
+            contact.over = own
+                .map(|(index, b)| Over::new(rig, index, b, rest))
+                .collect();
         }
         Ok(Some(contact))
     }
 
     /// Moves the skin out of what it is in.
     ///
-    /// - `colliders`, `eyes`: poses now [mm, head frame], those of eyeballs about their centres
+    /// - `colliders`, `bodies`: poses now [mm, head frame], those of bodies about their centres
     pub(super) fn settle(
         &mut self,
         skin: &mut [Point3<f32>],
         colliders: &[Isometry3<f64>],
-        eyes: &[Isometry3<f64>; 2],
+        bodies: &[Isometry3<f64>],
     ) -> SkinContactReport {
         let mut report = SkinContactReport::default();
         let mut best: Option<(f32, Vec<Point3<f32>>)> = None;
         for round in 0..=ROUNDS {
-            let mut asked = self.ask(skin, colliders, eyes);
+            let mut asked = self.ask(skin, colliders, bodies);
             let largest = asked.largest();
             if round == 0 {
                 report.deepest_before = f64::from(asked.deepest);
@@ -188,7 +193,7 @@ impl SkinContact {
         if let Some((_, best)) = best {
             skin.copy_from_slice(&best);
         }
-        self.finish(skin, colliders, eyes, &mut report);
+        self.finish(skin, colliders, bodies, &mut report);
         report
     }
 
@@ -197,13 +202,13 @@ impl SkinContact {
         &mut self,
         skin: &mut [Point3<f32>],
         colliders: &[Isometry3<f64>],
-        eyes: &[Isometry3<f64>; 2],
+        bodies: &[Isometry3<f64>],
         report: &mut SkinContactReport,
     ) {
         if report.deepest_after == 0.0 || report.deepest_after > SINGLE {
             return;
         }
-        let asked = self.ask(skin, colliders, eyes);
+        let asked = self.ask(skin, colliders, bodies);
         let before: Vec<(u32, Point3<f32>)> = asked
             .near
             .keys()
@@ -213,7 +218,7 @@ impl SkinContact {
         for (&v, by) in asked.near.iter().chain(&asked.under) {
             skin[v as usize] += by;
         }
-        let left = f64::from(self.ask(skin, colliders, eyes).deepest);
+        let left = f64::from(self.ask(skin, colliders, bodies).deepest);
         if left < report.deepest_after {
             report.deepest_after = left;
         } else {
@@ -239,14 +244,14 @@ impl SkinContact {
         &mut self,
         skin: &[Point3<f32>],
         colliders: &[Isometry3<f64>],
-        eyes: &[Isometry3<f64>; 2],
+        bodies: &[Isometry3<f64>],
     ) -> Asked {
         let mut asked = Asked::default();
         if let Some(lips) = &mut self.lips {
             lips.ask(skin, &mut asked);
         }
-        for lids in &self.lids {
-            lids.ask(skin, &eyes[lids.eye], &mut asked);
+        for over in &self.over {
+            over.ask(skin, &bodies[over.body], &mut asked);
         }
         for (shape, pose) in self.shapes.iter().zip(colliders) {
             self.ask_off(shape, pose, skin, &mut asked);
@@ -341,17 +346,8 @@ impl Asked {
 impl Lips {
     fn new(rig: &Rig, triangles: &[[u32; 3]], rest: &[Point3<f32>]) -> Option<Self> {
         let sheets = ["upper", "lower"].map(|which| {
-            let lip = rig.vertices_in(&[&format!("{which}_lip")]);
-            let lining = rig.vertices_in(&[&format!("mouth_interior_{which}")]);
             let mut is_of_lip = vec![false; rest.len()];
-            let near = |p: &Point3<f32>| {
-                lip.iter()
-                    .any(|&v| (rest[v as usize] - p).norm_squared() < LINING * LINING)
-            };
-            for &v in &lip {
-                is_of_lip[v as usize] = true;
-            }
-            for &v in lining.iter().filter(|&&v| near(&rest[v as usize])) {
+            for v in lip_with_lining(rig, which, rest) {
                 is_of_lip[v as usize] = true;
             }
             let own = triangles.iter().copied();
@@ -491,20 +487,24 @@ impl LipTouch {
     }
 }
 
-impl Lids {
-    fn new(rig: &Rig, eye: usize, ball: &Eyeball, rest: &[Point3<f32>]) -> Self {
-        let side = ["l", "r"][eye];
-        let vertices =
-            rig.vertices_in(&[&format!("upper_lid_{side}"), &format!("lower_lid_{side}")]);
-        let shape = WorldShape::of_star(ball.surface.clone());
-        let height = |&v: &u32| {
-            let from_center = rest[v as usize].cast::<f64>() - ball.center;
-            (shape.nearest(&from_center).distance as f32).min(LID_HEIGHT)
+impl Over {
+    fn new(rig: &Rig, index: usize, body: &Body, rest: &[Point3<f32>]) -> Self {
+        let regions: &[&str] = match body.follows {
+            RigidBody::EyeLeft => &["upper_lid_l", "lower_lid_l"],
+            RigidBody::EyeRight => &["upper_lid_r", "lower_lid_r"],
+            RigidBody::Skull => &["upper_lip", "mouth_interior_upper"],
+            RigidBody::Mandible => &["lower_lip", "mouth_interior_lower"],
         };
+        let vertices = rig.vertices_in(regions);
+        let height = |v: u32| {
+            let at = rest[v as usize].cast::<f64>() - body.center;
+            body.visible.distance(&at) as f32
+        };
+        let heights = vertices.iter().map(|&v| height(v).min(LID_HEIGHT));
         Self {
-            eye,
-            heights: vertices.iter().map(height).collect(),
-            ball: shape,
+            body: index,
+            heights: heights.collect(),
+            shape: WorldShape::of_star(body.visible.clone()),
             vertices,
         }
     }
@@ -513,11 +513,11 @@ impl Lids {
         let inverse = pose.inverse();
         for (&v, &height) in self.vertices.iter().zip(&self.heights) {
             let local = (inverse * skin[v as usize].cast::<f64>()).coords;
-            let reach = self.ball.radius + f64::from(LID_HEIGHT);
+            let reach = self.shape.radius + f64::from(LID_HEIGHT);
             if local.norm_squared() > reach * reach {
                 continue;
             }
-            let place = self.ball.nearest(&local);
+            let place = self.shape.nearest(&local);
             let lack = height - place.distance as f32;
             let Some(normal) = place.normal.filter(|_| lack > 0.0) else {
                 continue;
@@ -528,6 +528,20 @@ impl Lids {
             asked.deepest = asked.deepest.max(depth);
         }
     }
+}
+
+/// Vertices of a lip and of what of its lining is near it, rising.
+fn lip_with_lining(rig: &Rig, which: &str, rest: &[Point3<f32>]) -> Vec<u32> {
+    let mut lip = rig.vertices_in(&[&format!("{which}_lip")]);
+    let mut lining = rig.vertices_in(&[&format!("mouth_interior_{which}")]);
+    let is_near = |p: &Point3<f32>| {
+        lip.iter()
+            .any(|&v| (rest[v as usize] - p).norm_squared() < LINING * LINING)
+    };
+    lining.retain(|&v| is_near(&rest[v as usize]));
+    lip.extend(lining);
+    lip.sort_unstable();
+    lip
 }
 
 /// Asks for `lack` along `normal`, over what is asked for already.

@@ -225,9 +225,7 @@ impl SkinDeformer {
         by_patch
             .into_par_iter()
             .for_each(|(frames, now, last, affines)| {
-                for (node, out) in affines.iter_mut().enumerate() {
-                    *out = frames.affine(now, node).into();
-                }
+                frames.for_each_affine(now, |node, affine| affines[node] = affine.into());
                 last.copy_from_slice(now);
             });
         let deformer = &*self;

@@ -17,6 +17,7 @@
 use nalgebra::Point3;
 
 use crate::anatomy::GridShape;
+use crate::machine::vectorized;
 
 /// Where the Gaussian is cut off, in its widths.
 const REACH: f32 = 2.5;
@@ -29,7 +30,7 @@ pub struct SheetFilter {
     grid: GridShape,
     /// Half a kernel along u and along v: at the node, one away, two away, ...
     along: [Vec<f32>; 2],
-    /// `m` of each node.
+    /// `m` of each number of the nodes.
     share: Vec<f32>,
     scratch: Scratch,
 }
@@ -71,7 +72,7 @@ impl SheetFilter {
         Self {
             grid,
             along,
-            share,
+            share: share.iter().flat_map(|&m| [m; 3]).collect(),
             scratch: Scratch::default(),
         }
     }
@@ -95,28 +96,38 @@ impl SheetFilter {
         targets: &[Point3<f32>],
         out: &mut [Point3<f32>],
     ) {
-        let counts = [nodes.len(), targets.len(), out.len()];
+        let counts = [nodes.len(), targets.len(), out.len()].map(|count| 3 * count);
         assert_eq!(counts, [self.share.len(); 3]);
+        vectorized(Apply {
+            filter: self,
+            nodes,
+            targets,
+            out,
+        });
+    }
+
+    #[inline(always)]
+    fn take(&mut self, nodes: &[f32], targets: &[f32], out: &mut [f32]) {
         let Scratch { own, filtered, .. } = &mut self.scratch;
         own.clear();
-        let ways = nodes
-            .iter()
-            .zip(targets)
-            .map(|(node, target)| node - target);
-        own.extend(ways.flat_map(<[f32; 3]>::from));
+        own.extend(
+            nodes
+                .iter()
+                .zip(targets)
+                .map(|(node, target)| node - target),
+        );
         filtered.resize(own.len(), 0.0);
         self.filter_along_u();
         self.filter_along_v();
         let Scratch { own, filtered, .. } = &self.scratch;
-        let ways = own.chunks_exact(3).zip(filtered.chunks_exact(3));
+        let ways = own.iter().zip(filtered);
         let nodes = nodes.iter().zip(&self.share).zip(out);
         for ((own, filtered), ((node, share), out)) in ways.zip(nodes) {
-            for k in 0..3 {
-                out[k] = node[k] + share * (filtered[k] - own[k]);
-            }
+            *out = node + share * (filtered - own);
         }
     }
 
+    #[inline(always)]
     fn filter_along_u(&mut self) {
         let taps = &self.along[0];
         let (width, pad) = (3 * self.grid.u_count as usize, 3 * (taps.len() - 1));
@@ -148,6 +159,7 @@ impl SheetFilter {
         }
     }
 
+    #[inline(always)]
     fn filter_along_v(&mut self) {
         let taps = &self.along[1];
         let width = 3 * self.grid.u_count as usize;
@@ -165,6 +177,24 @@ impl SheetFilter {
                 add_pair(out, row(before), row(after), tap);
             }
         }
+    }
+}
+
+struct Apply<'a> {
+    filter: &'a mut SheetFilter,
+    nodes: &'a [Point3<f32>],
+    targets: &'a [Point3<f32>],
+    out: &'a mut [Point3<f32>],
+}
+
+impl pulp::NullaryFnOnce for Apply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let [nodes, targets] = [self.nodes, self.targets].map(bytemuck::cast_slice);
+        self.filter
+            .take(nodes, targets, bytemuck::cast_slice_mut(self.out));
     }
 }
 
@@ -198,6 +228,7 @@ fn half_gaussian(width: f32, room: usize) -> Vec<f32> {
     taps.iter().map(|tap| tap / sum).collect()
 }
 
+#[inline(always)]
 fn scale(out: &mut [f32], row: &[f32], tap: f32) {
     for (out, x) in out.iter_mut().zip(row) {
         *out = tap * x;
@@ -206,6 +237,7 @@ fn scale(out: &mut [f32], row: &[f32], tap: f32) {
 
 /// Both neighbours are added before they are weighed, so that a mirrored patch gives the mirrored
 /// bits.
+#[inline(always)]
 fn add_pair(out: &mut [f32], before: &[f32], after: &[f32], tap: f32) {
     for ((out, a), b) in out.iter_mut().zip(before).zip(after) {
         *out += tap * (a + b);

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::machine::vectorized;
 use crate::template::{EyeSocket, JawHinge};
 use crate::transfer::{JawField, JawMode, JawShapes, LidField, MuscleShape};
 
@@ -101,17 +102,13 @@ impl PatchTransfer {
         };
         for &(i, weight, rate) in &active {
             let shape = &self.shapes[i];
-            if is_hinged(shape.shape) {
-                continue;
-            }
-            let (weight, rate) = (alpha * weight, alpha * rate);
-            for ((x, v), delta) in positions
-                .iter_mut()
-                .zip(&mut *velocities)
-                .zip(&shape.deltas)
-            {
-                *x += delta * weight;
-                *v += delta * rate;
+            if !is_hinged(shape.shape) {
+                vectorized(AddShape {
+                    deltas: bytemuck::cast_slice(&shape.deltas),
+                    by: [alpha * weight, alpha * rate],
+                    positions: bytemuck::cast_slice_mut(positions),
+                    velocities: bytemuck::cast_slice_mut(velocities),
+                });
             }
         }
         if let Some(jaw) = jaw {
@@ -148,6 +145,28 @@ impl PatchTransfer {
                     change_rate,
                 );
             }
+        }
+    }
+}
+
+/// Adds a shape to positions and velocities, number by number.
+struct AddShape<'a> {
+    deltas: &'a [f32],
+    by: [f32; 2],
+    positions: &'a mut [f32],
+    velocities: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for AddShape<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let [weight, rate] = self.by;
+        let moved = self.positions.iter_mut().zip(self.velocities);
+        for ((x, v), delta) in moved.zip(self.deltas) {
+            *x += delta * weight;
+            *v += delta * rate;
         }
     }
 }

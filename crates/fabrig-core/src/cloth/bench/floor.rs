@@ -11,7 +11,7 @@ use crate::cloth::constraints::bend::{BendCompliance, project_bend};
 use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{RestLengths, StretchCompliance, project_stretch};
-use crate::cloth::lanes::{F32x8, Real, Vec3};
+use crate::machine::{F32x8, Real, Vec3, vectorized};
 
 /// Sweeps in one timing.
 const SWEEPS: usize = 64;
@@ -53,7 +53,7 @@ pub fn floor(scene: &BenchScene) -> Floor {
     let mut least = f64::INFINITY;
     for _ in 0..TIMINGS {
         let clock = Instant::now();
-        crate::cloth::group::vectorized(Sweeps(&mut kernel));
+        vectorized(Sweeps(&mut kernel));
         least = least.min(clock.elapsed().as_secs_f64());
     }
     let projections = (SWEEPS * count * Lanes::LANES) as f64;

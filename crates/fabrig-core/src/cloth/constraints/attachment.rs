@@ -16,7 +16,7 @@
 //! Benevolenski & Voroshilov 2012, *Mass splitting for jitter-free parallel rigid body
 //! simulation*.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Differences of displacements are kept within this. (mm)
 const LARGEST: f64 = 65_536.0;

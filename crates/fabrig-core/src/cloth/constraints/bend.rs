@@ -16,7 +16,7 @@
 //! for inextensible surfaces*, on a regular grid; projection as a vector-valued XPBD
 //! constraint (Macklin et al. 2016, eq. 18) with the dropoff at its current value.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Bending of one substep.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,7 @@
 //!
 //! Source: nCloth's *damp*; folding as in Bouaziz et al. 2014, *Projective dynamics*, eq. 2.
 
-use crate::cloth::lanes::Real;
+use crate::machine::Real;
 
 /// What damping adds to a node's effective mass, all of it drawing to `x_b`. [mass]
 ///

@@ -11,7 +11,7 @@
 //!
 //! Source: any text on mechanics in rotating frames, e.g. Landau & Lifshitz, *Mechanics*, 39.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Acceleration in the head frame, splatted over the lanes.
 #[derive(Debug, Clone, Copy)]

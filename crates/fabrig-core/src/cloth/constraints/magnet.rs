@@ -13,7 +13,7 @@
 //! Source: Zhu & Joslin 2024, Eq. 4; folding of diagonal quadratic terms into the inertial
 //! term as in Bouaziz et al. 2014, *Projective dynamics*, eq. 2.
 
-use crate::cloth::lanes::Real;
+use crate::machine::Real;
 
 /// The magnet of every node of a patch.
 #[derive(Debug, Clone, Copy)]

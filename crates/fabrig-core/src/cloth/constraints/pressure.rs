@@ -19,7 +19,7 @@
 //! Source: Müller et al. 2007, *Position based dynamics*, section 4.4 (cloth balloons),
 //! written for a sheet over a floor; XPBD eq. 18.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// What a pad's volume is between.
 #[derive(Debug, Clone, Copy)]

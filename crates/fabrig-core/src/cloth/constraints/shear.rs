@@ -7,7 +7,7 @@
 //! Source: Provot 1995, *Deformation constraints in a mass-spring model*, shear springs.
 
 use super::stretch::{RestLengths, edge_length};
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Projects one diagonal.
 ///

@@ -14,7 +14,7 @@
 //! Source: Macklin, Müller & Chentanez 2016, *XPBD*, eqs. 18 and 26, with no multiplier
 //! carried over, as there is one sweep per substep; separate compression as in nCloth.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Lengths below this are taken for this. (mm)
 const SHORTEST: f64 = 1e-12;

@@ -10,7 +10,7 @@
 //!
 //! Source: Wejchert & Haumann 1991, *Animation aerodynamics*, section 3, without shielding.
 
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Coefficients of the air.
 #[derive(Debug, Clone, Copy)]

@@ -3,7 +3,7 @@
 use super::state::{Group, relative};
 use crate::cloth::constraints::attachment::anchor_pull;
 use crate::cloth::input::{ClothPatch, PatchMotion};
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// No anchor in this lane.
 const NONE: u32 = u32::MAX;

@@ -20,7 +20,7 @@ use crate::cloth::constraints::grid_lists::GridLists;
 use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Passes for each sweep asked for.
 const PASSES: u32 = 4;

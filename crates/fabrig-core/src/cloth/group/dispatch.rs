@@ -3,13 +3,14 @@
 use nalgebra::{Point3, Vector3};
 
 use super::descent::merge;
-use super::instructions::vectorized;
 use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Ports, Substep};
 use super::pairs::PairTable;
 use super::state::{FARTHEST, Group};
 use crate::cloth::input::{Mode, PatchMotion};
-use crate::cloth::lanes::Real;
 use crate::cloth::report::Energies;
+use crate::cloth::time::hermite;
+use crate::machine::Real;
+use crate::machine::vectorized;
 
 impl<R: Real> PatchGroup for Group<R> {
     fn patches(&self) -> &[usize] {
@@ -115,6 +116,30 @@ impl<R: Real> PatchGroup for Group<R> {
     fn shift(&mut self, lane: usize, node: usize, by: [f64; 3]) {
         let x = self.solution[node].lane(lane);
         self.solution[node].set_lane(lane, [0, 1, 2].map(|axis| x[axis] + by[axis]));
+    }
+
+    fn straighten(
+        &mut self,
+        lane: usize,
+        node: usize,
+        (from, progress): (Point3<f32>, f64),
+        [elapsed, h]: [f64; 2],
+    ) {
+        let center = self.origin.lane(lane);
+        let (end, began) = (hermite(1.0), hermite(progress));
+        let left = [0, 1, 2].map(|k| R::splat(end[k] - began[k]));
+        let target = self.ends[node] - self.segments().weighted(node, left);
+        let (target, x) = (target.lane(lane), self.solution[node].lane(lane));
+        let goal = self.targets[node].lane(lane);
+        let h_e = self.h_e.lane(lane);
+        let u = [0, 1, 2].map(|k| x[k] - goal[k]);
+        let v = [0, 1, 2].map(|k| {
+            let began = f64::from(from[k]) - center[k] - target[k];
+            (u[k] - began) / elapsed
+        });
+        self.past[node].set_lane(lane, [0, 1, 2].map(|k| u[k] - v[k] * h_e));
+        self.displacements[node].set_lane(lane, [0, 1, 2].map(|k| u[k] - v[k] * h));
+        self.velocities[node].set_lane(lane, v);
     }
 
     fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool) {

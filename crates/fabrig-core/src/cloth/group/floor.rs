@@ -4,7 +4,7 @@ use super::interface::{GroupFloor, Ports};
 use super::state::Group;
 use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::input::PatchMotion;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// The floor of the pads of a group.
 #[derive(Debug, Clone)]

@@ -8,7 +8,7 @@ use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::shear::shear_energy;
 use crate::cloth::constraints::stretch::stretch_energy;
 use crate::cloth::input::PatchMotion;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 impl<R: Real> Group<R> {
     /// Patch of a lane; lanes to spare repeat the last one.

@@ -8,7 +8,6 @@ mod descent;
 mod dispatch;
 mod floor;
 mod frame;
-mod instructions;
 mod interface;
 mod pairs;
 mod paper;
@@ -17,10 +16,6 @@ mod state;
 mod substep;
 mod sweeps;
 
-pub use instructions::instruction_set;
-#[cfg(test)]
-pub(crate) use instructions::tests::with_baseline;
-pub(crate) use instructions::vectorized;
 pub(crate) use interface::{
     FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Ports, Substep,
 };

@@ -3,7 +3,7 @@
 use super::interface::{GroupPairs, Ports};
 use super::state::Group;
 use crate::cloth::constraints::attachment::{OrderFreeSum, PairEnd, PairVector, pair_share};
-use crate::cloth::lanes::Real;
+use crate::machine::Real;
 
 /// Marks versions of masses that do not yield.
 const SLEEPING: u64 = 1 << 40;

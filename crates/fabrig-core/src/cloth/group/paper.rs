@@ -10,7 +10,7 @@ use super::interface::Substep;
 use super::solve::SweepCompliance;
 use super::state::Group;
 use crate::cloth::constraints::stretch::StretchCompliance;
-use crate::cloth::lanes::Real;
+use crate::machine::Real;
 
 /// The step that shares are calibrated for. (s)
 const STEP: f64 = 1.0 / 60.0;

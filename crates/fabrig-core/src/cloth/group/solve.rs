@@ -6,7 +6,7 @@ use crate::cloth::constraints::bend::{BendCompliance, project_bend};
 use crate::cloth::constraints::pressure::{PadFaces, project_pressure};
 use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
-use crate::cloth::lanes::Real;
+use crate::machine::Real;
 
 /// Compliances of one sweep.
 #[derive(Debug, Clone, Copy)]

@@ -14,8 +14,8 @@ use crate::cloth::constraints::wind::Air;
 use crate::cloth::input::{
     ClothAttachment, ClothOptions, ClothPatch, Integrator, Mode, NodeVariation,
 };
-use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::materials::Material;
+use crate::machine::{Real, Vec3};
 
 /// How much more the lengths of the loosest skin are varied than those of skin that is not loose.
 const UNEVENNESS: f64 = 12.0;

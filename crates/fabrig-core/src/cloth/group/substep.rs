@@ -9,8 +9,8 @@ use crate::cloth::constraints::damping::damping_mass;
 use crate::cloth::constraints::inertia::{FrameForces, frame_acceleration};
 use crate::cloth::constraints::wind::add_wind;
 use crate::cloth::input::{Integrator, Mode};
-use crate::cloth::lanes::{Real, Vec3};
 use crate::cloth::time::{Stencil, hermite};
+use crate::machine::{Real, Vec3};
 
 /// A node's motion: displacements from the target (mm) and velocities (mm/s), now and a
 /// substep ago.
@@ -23,7 +23,7 @@ struct NodeMotion<R> {
 }
 
 /// Hermite segments of all nodes over a frame. (mm)
-struct Segments<'a, R> {
+pub(super) struct Segments<'a, R> {
     chords: &'a [Vec3<R>],
     start_slopes: &'a [Vec3<R>],
     end_slopes: &'a [Vec3<R>],
@@ -32,7 +32,7 @@ struct Segments<'a, R> {
 impl<R: Real> Segments<'_, R> {
     /// Part of a node's segment. (mm)
     #[inline(always)]
-    fn weighted(&self, i: usize, [chord, start, end]: [R; 3]) -> Vec3<R> {
+    pub(super) fn weighted(&self, i: usize, [chord, start, end]: [R; 3]) -> Vec3<R> {
         self.chords[i] * chord + self.start_slopes[i] * start + self.end_slopes[i] * end
     }
 }
@@ -392,7 +392,7 @@ impl<R: Real> Group<R> {
 
     /// Hermite segments of the frame.
     #[inline(always)]
-    fn segments(&self) -> Segments<'_, R> {
+    pub(super) fn segments(&self) -> Segments<'_, R> {
         Segments {
             chords: &self.chords,
             start_slopes: &self.start_slopes,

@@ -9,7 +9,7 @@ use super::interface::Substep;
 use super::state::Group;
 use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::constraints::stretch::RestLengths;
-use crate::cloth::lanes::{Real, Vec3};
+use crate::machine::{Real, Vec3};
 
 /// Lengths below this are taken for this. (mm)
 const SHORTEST: f64 = 1e-12;

@@ -3,10 +3,10 @@
 use nalgebra::{Point3, Vector3};
 
 use super::support::*;
-use crate::cloth::group::with_baseline;
 use crate::cloth::{
     Cloth, ClothAttachment, ClothOptions, ClothPatch, FrameInput, Material, PatchMotion, Precision,
 };
+use crate::machine::with_baseline;
 
 /// Left and right muscles and pads with a ring between, all coupled.
 fn scene() -> Vec<ClothPatch> {

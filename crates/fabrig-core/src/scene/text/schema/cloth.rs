@@ -76,11 +76,16 @@ pub(super) const CONTACT: &[Key] = &[
         Kind::Flag,
         "whether eyeballs, teeth and gums hold patches out",
     ),
+    Key::new(
+        "every",
+        Kind::Integer { low: 1, high: 64 },
+        "substeps from one pass of contact to the next, at most",
+    ),
     Key::optional(
         "sticky_lips",
         Kind::Table(STICKY),
         "lips that stick; they do not where left out",
-        "{ gap = 0.5, break_gap = 6.0, strength = 0.003, rows = 3 }",
+        "{ gap = 0.5, break_gap = 6.0, strength = 0.0022, rows = 3 }",
     ),
 ];
 
@@ -101,7 +106,7 @@ const STICKY: &[Key] = &[
         "strength",
         from_to(0.0, 1e3),
         "or pull harder than this (N of one node)",
-        "0.003",
+        "0.0022",
     ),
     Key::optional(
         "rows",
