@@ -175,10 +175,10 @@ fn affines(block: &Block, frame: &Frame, now: Vec3<F32x8>) -> [F32x8; 12] {
     let rest = [block.rest.x, block.rest.y, block.rest.z];
     let mut shift = [now.x - rest[0], now.y - rest[1], now.z - rest[2]];
     for j in 0..3 {
-        turn[j][j] = turn[j][j] - one;
+        turn[j][j] -= one;
         for i in 0..3 {
             turn[j][i] = Real::select_less(zero, difference, turn[j][i], zero);
-            shift[i] = shift[i] - turn[j][i] * rest[j];
+            shift[i] -= turn[j][i] * rest[j];
         }
     }
     let [[a, b, c], [d, e, f], [g, h, i]] = turn;
