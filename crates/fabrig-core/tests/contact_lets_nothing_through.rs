@@ -14,6 +14,7 @@ use fabrig_core::collision::{Collider, ColliderFrame, ColliderShape, PairMask, S
 use fabrig_core::mesh::Surface;
 use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::scene::{Scene, Simulation};
+use fabrig_core::template::RigidBody;
 use fabrig_core::{Point, Vector};
 use nalgebra::{Isometry3, Unit};
 
@@ -213,10 +214,13 @@ fn lips_and_cheeks_rest_on_teeth_and_gums() {
     let rig = &faces::demo().rig;
     let rest = rig.skin_at_rest();
     let mut is_teeth = vec![false; rest.len()];
-    for part in rig.parts.iter().filter(|p| p.name.contains("teeth")) {
-        for &v in &part.vertices {
-            is_teeth[v as usize] = true;
-        }
+    let is_jaw = |body| matches!(body, RigidBody::Skull | RigidBody::Mandible);
+    let jaws = rig.parts.iter().filter(|p| is_jaw(p.follows));
+    for &v in jaws
+        .filter(|p| p.name != "tongue")
+        .flat_map(|p| &p.vertices)
+    {
+        is_teeth[v as usize] = true;
     }
     let mut triangles = rig.face.triangles();
     triangles.retain(|t| t.iter().all(|&v| is_teeth[v as usize]));
