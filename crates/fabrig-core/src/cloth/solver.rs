@@ -211,7 +211,7 @@ impl Cloth {
         among_workers(|| self.step_hooked(input, None))
     }
 
-    /// As [`Cloth::step`], with `hook` moving nodes at the end of every substep.
+    /// As [`Cloth::step`], with `hook` moving nodes at the end of substeps, as its stride says.
     ///
     /// # Errors
     ///

@@ -56,7 +56,7 @@ pub struct ContactOptions {
     pub thickness: f64,
     /// Coulomb's friction coefficient between patches; wet inner lips and lids slide easily.
     pub friction: f64,
-    /// Friction coefficient of lids on eyeballs.
+    /// Friction coefficient of lids on eyeballs, and of lips and cheeks on teeth and gums.
     pub eye_friction: f64,
     /// Whether eyeballs, teeth and gums hold patches out.
     pub bones: bool,

@@ -1,9 +1,9 @@
 //! Lane types: one text of every kernel for scalars and for several patches at once.
 //!
-//! A kernel written over [`Real`] runs on `f64` (the reference), on `f32`, and on
-//! lane types such as [`F32x8`], where lane k belongs to the k-th patch of a group (lane per patch: the patches
-//! of a group share their grid, so no lane ever needs another lane's neighbour, and nothing
-//! is gathered).
+//! A kernel written over [`Real`] runs on `f64` (the reference), on `f32`, and on lane types such
+//! as [`F32x8`]. In the cloth lane k belongs to the k-th patch of a group: the patches of a group
+//! share their grid, so no lane ever needs another lane's neighbour, and nothing is gathered.
+//! Contact has pairs of elements in lanes, skin the nodes of a row.
 //!
 //! Only IEEE-exact operations are used (+, -, *, /, square root, comparison; never a fused
 //! multiply-add or an approximate reciprocal), so a patch has the same bits whatever lane,

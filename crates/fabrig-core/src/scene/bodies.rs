@@ -48,7 +48,7 @@ pub(super) fn bodies(rig: &Rig) -> Vec<Body> {
 fn eyeball(rig: &Rig, eye: usize, rest: &[Point3<f32>]) -> Body {
     let socket = &rig.eyes[eye];
     let follows = [RigidBody::EyeLeft, RigidBody::EyeRight][eye];
-    let own = surface_of(rig, follows, rest);
+    let own = surface_of(rig, &vertices_of(rig, follows), rest);
     let radius_of = |direction: &Vector| {
         let hit = from_outside(
             own.as_ref()?,
@@ -72,8 +72,8 @@ fn eyeball(rig: &Rig, eye: usize, rest: &[Point3<f32>]) -> Body {
 /// The outside of teeth and gums, seen from the middle of their arch, with the bone that goes on
 /// from the gums; none where the user's mesh has none. Where the arch is open there is no surface.
 fn jaw(rig: &Rig, follows: RigidBody, rest: &[Point3<f32>]) -> Option<Body> {
-    let surface = surface_of(rig, follows, rest)?;
     let vertices = vertices_of(rig, follows);
+    let surface = surface_of(rig, &vertices, rest)?;
     let points = || vertices.iter().map(|&v| rest[v as usize].cast::<f64>());
     let first = points().next()?;
     let (low, high) = points().fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
@@ -99,11 +99,12 @@ fn jaw(rig: &Rig, follows: RigidBody, rest: &[Point3<f32>]) -> Option<Body> {
     })
 }
 
-/// Radius a sample beside a direction: what lies between a sample that has one and a sample that has
+/// Radius a sample beside a direction: without it what lies between a sample that has one and a sample that has
 /// none would have none.
 fn beside(d: &Vector, hit: impl Fn(&Vector) -> Option<f64>) -> Option<f64> {
     let tilt = std::f64::consts::FRAC_PI_2 / (JAW_SIDE - 1) as f64;
-    let (across, along) = (d.cross(&Vector::y()), d.cross(&Vector::y()).cross(d));
+    let across = d.cross(&Vector::y());
+    let along = across.cross(d);
     let ways = [across, -across, along, -along];
     let tilted = ways.iter().filter_map(|way| {
         let way = way.try_normalize(1e-6)?;
@@ -161,9 +162,9 @@ fn vertices_of(rig: &Rig, body: RigidBody) -> Vec<u32> {
 }
 
 /// The surface of these pieces.
-fn surface_of(rig: &Rig, body: RigidBody, rest: &[Point3<f32>]) -> Option<Surface> {
+fn surface_of(rig: &Rig, vertices: &[u32], rest: &[Point3<f32>]) -> Option<Surface> {
     let mut is_of_body = vec![false; rest.len()];
-    for v in vertices_of(rig, body) {
+    for &v in vertices {
         is_of_body[v as usize] = true;
     }
     let mut triangles = rig.face.triangles();

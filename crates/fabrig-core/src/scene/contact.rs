@@ -27,8 +27,6 @@ pub(super) struct FaceContact {
     set_poses: Vec<Option<Isometry3<f64>>>,
     /// Poses now, in the head frame. (mm)
     poses: Vec<Isometry3<f64>>,
-    /// What each body of the face moves with, and its pose at rest.
-    bodies: Vec<(RigidBody, Isometry3<f64>)>,
 }
 
 impl FaceContact {
@@ -95,18 +93,17 @@ impl FaceContact {
             set_poses: vec![None; scene.colliders.len()],
             poses: vec![Isometry3::identity(); scene.colliders.len()],
             colliders: scene.colliders.clone(),
-            bodies: bodies.iter().map(|b| (b.follows, b.rest())).collect(),
         }))
     }
 
     /// Says where everything is at the end of the next frame.
     ///
-    /// - `moved`: what a body of the face does against rest [mm, head frame]
+    /// - `bodies`: poses of the face's own [mm, head frame]
     pub(super) fn begin_frame(
         &mut self,
         time: f64,
         head: &Isometry3<f64>,
-        moved: impl Fn(RigidBody) -> Isometry3<f64>,
+        bodies: &[Isometry3<f64>],
     ) {
         for ((pose, collider), set) in self
             .poses
@@ -120,9 +117,7 @@ impl FaceContact {
                 ColliderFrame::Head => own,
             };
         }
-        let bodies = self.bodies.iter();
-        let bodies: Vec<_> = bodies.map(|&(body, rest)| moved(body) * rest).collect();
-        self.contact.begin_frame(&bodies, &self.poses);
+        self.contact.begin_frame(bodies, &self.poses);
     }
 
     pub(super) fn set_pose(

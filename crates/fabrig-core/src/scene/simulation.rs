@@ -19,7 +19,7 @@ use crate::machine::among_workers;
 use crate::motion::{Clip, EyeAngles, Sample};
 use crate::rig::{NodeTargets, Rig};
 use crate::scene::anchors::{BoneAnchors, Mandible};
-use crate::scene::bodies::{Body, bodies};
+use crate::scene::bodies::bodies;
 use crate::scene::contact::FaceContact;
 use crate::scene::economy::{EconomyReport, Thrift};
 use crate::scene::fields::{Curve, Fields, HeadDrive};
@@ -130,8 +130,9 @@ pub struct Simulation {
     contact: Option<FaceContact>,
     skin_contact: Option<SkinContact>,
     skin_report: SkinContactReport,
-    /// What holds patches and skin out; none where nothing touches.
-    bodies: Vec<Body>,
+    /// What holds patches and skin out moves with these, and stands so at rest; none where nothing
+    /// touches. [mm, head frame]
+    bodies: Vec<(RigidBody, Isometry3<f64>)>,
     evaluated: Vec<NodeTargets>,
     targets: Vec<PatchMotion>,
     anchors: Vec<PatchMotion>,
@@ -170,7 +171,7 @@ impl Simulation {
             Dynamics::Cloth => Some(Cloth::new(&patches, &scene.cloth)?),
             Dynamics::None => None,
         };
-        let bodies = if scene.has_contact() {
+        let bodies = if scene.has_contact() && scene.contact.bones {
             bodies(&rig)
         } else {
             Vec::new()
@@ -226,7 +227,7 @@ impl Simulation {
             contact,
             skin_contact,
             skin_report: SkinContactReport::default(),
-            bodies,
+            bodies: bodies.iter().map(|b| (b.follows, b.rest())).collect(),
             evaluated: vec![(Vec::new(), Vec::new()); count],
             targets: vec![PatchMotion::default(); count],
             anchors: vec![PatchMotion::default(); count],
@@ -593,10 +594,16 @@ impl Simulation {
     }
 
     fn begin_contact(&mut self, time: f64) {
-        if let Some(mut contact) = self.contact.take() {
-            contact.begin_frame(time, &self.world, |body| self.body(body));
-            self.contact = Some(contact);
+        let bodies = self.body_poses();
+        if let Some(contact) = &mut self.contact {
+            contact.begin_frame(time, &self.world, &bodies);
         }
+    }
+
+    /// Where the bodies stand that hold patches and skin out. [mm, head frame]
+    fn body_poses(&self) -> Vec<Isometry3<f64>> {
+        let bodies = self.bodies.iter();
+        bodies.map(|(body, rest)| self.body(*body) * rest).collect()
     }
 
     fn move_skin(&mut self) -> Result<(), SceneError> {
@@ -622,8 +629,7 @@ impl Simulation {
             self.skin_moved = self.skin.len();
         }
         self.has_skin = true;
-        let bodies = self.bodies.iter();
-        let bodies: Vec<_> = bodies.map(|b| self.body(b.follows) * b.rest()).collect();
+        let bodies = self.body_poses();
         if let Some(contact) = &mut self.skin_contact {
             let colliders = self.contact.as_ref().map_or(&[][..], |c| c.poses());
             self.skin_report = contact.settle(&mut self.skin, colliders, &bodies);

@@ -2,9 +2,9 @@
 //!
 //! Patches keep apart by contact of their own; the skin hangs on them, and bends less finely
 //! than what it meets. So after it is deformed, the few vertices that are where they must not
-//! be ask to be moved: lips off each other and off the teeth, lids off the eyeball with its cornea,
-//! all skin off colliders. What they ask is spread over the skin around them ([`SkinSpreader`]), so that no
-//! dent shows, and a few rounds later nothing is left to ask.
+//! be ask to be moved: lips off each other and off the teeth, lids off the eyeball with its
+//! cornea, all skin off colliders. What they ask is spread over the skin around them
+//! ([`SkinSpreader`]), so that no dent shows, and a few rounds later nothing is left to ask.
 //!
 //! What crossed at rest may stay as deep as it was.
 
@@ -147,7 +147,8 @@ impl SkinContact {
                 LipTouch::new(rig, lips, scene.contact.sticky_lips.as_ref()?, rest)
             });
         }
-        if has_own && scene.contact.bones {
+        if has_own {
+            // None where bones hold nothing out.
             let own = bodies.iter().enumerate().filter(|(_, b)| b.is_own);
             contact.over = own
                 .map(|(index, b)| Over::new(rig, index, b, rest))
@@ -346,8 +347,17 @@ impl Asked {
 impl Lips {
     fn new(rig: &Rig, triangles: &[[u32; 3]], rest: &[Point3<f32>]) -> Option<Self> {
         let sheets = ["upper", "lower"].map(|which| {
+            let lip = rig.vertices_in(&[&format!("{which}_lip")]);
+            let lining = rig.vertices_in(&[&format!("mouth_interior_{which}")]);
             let mut is_of_lip = vec![false; rest.len()];
-            for v in lip_with_lining(rig, which, rest) {
+            let near = |p: &Point3<f32>| {
+                lip.iter()
+                    .any(|&v| (rest[v as usize] - p).norm_squared() < LINING * LINING)
+            };
+            for &v in &lip {
+                is_of_lip[v as usize] = true;
+            }
+            for &v in lining.iter().filter(|&&v| near(&rest[v as usize])) {
                 is_of_lip[v as usize] = true;
             }
             let own = triangles.iter().copied();
@@ -528,20 +538,6 @@ impl Over {
             asked.deepest = asked.deepest.max(depth);
         }
     }
-}
-
-/// Vertices of a lip and of what of its lining is near it, rising.
-fn lip_with_lining(rig: &Rig, which: &str, rest: &[Point3<f32>]) -> Vec<u32> {
-    let mut lip = rig.vertices_in(&[&format!("{which}_lip")]);
-    let mut lining = rig.vertices_in(&[&format!("mouth_interior_{which}")]);
-    let is_near = |p: &Point3<f32>| {
-        lip.iter()
-            .any(|&v| (rest[v as usize] - p).norm_squared() < LINING * LINING)
-    };
-    lining.retain(|&v| is_near(&rest[v as usize]));
-    lip.extend(lining);
-    lip.sort_unstable();
-    lip
 }
 
 /// Asks for `lack` along `normal`, over what is asked for already.

@@ -9,8 +9,7 @@ use super::state::{FARTHEST, Group};
 use crate::cloth::input::{Mode, PatchMotion};
 use crate::cloth::report::Energies;
 use crate::cloth::time::hermite;
-use crate::machine::Real;
-use crate::machine::vectorized;
+use crate::machine::{Real, vectorized};
 
 impl<R: Real> PatchGroup for Group<R> {
     fn patches(&self) -> &[usize] {
