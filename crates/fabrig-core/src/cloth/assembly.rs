@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup};
+use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup, Ports};
 use super::input::{ClothAttachment, ClothOptions, ClothPatch, Precision};
 use crate::machine::{F32x4, F32x8, F64x8, Real};
 
@@ -15,11 +15,11 @@ pub(crate) struct PatchLayout {
     pub(super) lane: usize,
 }
 
-/// Groups, the place of every patch in them, and whether there are pairs.
+/// Groups, the place of every patch in them, and their ports.
 pub(super) struct Assembly {
     pub(super) groups: Vec<Box<dyn PatchGroup>>,
     pub(super) layout: Vec<PatchLayout>,
-    pub(super) has_pairs: bool,
+    pub(super) ports: Ports,
 }
 
 /// Groups of `patches`, linked by their pairs.
@@ -41,11 +41,11 @@ pub(super) fn assemble(patches: &[ClothPatch], options: &ClothOptions) -> Assemb
         }
         groups.push(make_group(patches, &members, options));
     }
-    let has_pairs = link_pairs(patches, &layout, &mut groups);
+    let ports = link_pairs(patches, &layout, &mut groups);
     Assembly {
         groups,
         layout,
-        has_pairs,
+        ports,
     }
 }
 
@@ -99,12 +99,12 @@ fn make_group(
     }
 }
 
-/// Gives every group the pairs of its nodes. Returns whether there are any.
+/// Gives every group the pairs of its nodes. Returns the ports for them.
 fn link_pairs(
     patches: &[ClothPatch],
     layout: &[PatchLayout],
     groups: &mut [Box<dyn PatchGroup>],
-) -> bool {
+) -> Ports {
     /// A node of a pair: group, node, lane.
     type End = (usize, u32, u32);
     let end = |patch: usize, node: u32| -> End {
@@ -137,19 +137,26 @@ fn link_pairs(
     // Those with equally many pairs follow each other, so that the processor can tell where a
     // row of partners ends; among them they are in the order of memory.
     let mut ends: Vec<End> = counts.keys().copied().collect();
-    ends.sort_by_key(|end| counts[end]);
+    ends.sort_by_key(|end| (end.0, counts[end]));
     let mut ports: BTreeMap<End, usize> = BTreeMap::new();
     let mut lists = vec![GroupPairs::default(); groups.len()];
-    for (group, node, lane) in ends {
+    for (port, &(group, node, lane)) in ends.iter().enumerate() {
         let list = &mut lists[group];
-        ports.insert((group, node, lane), list.nodes.len());
+        ports.insert((group, node, lane), port);
         list.nodes.push((node, lane));
-        list.partners.push(Vec::new());
+        list.partners.push(Vec::with_capacity(counts[&ends[port]]));
     }
+    let port_counts: Vec<usize> = lists.iter().map(|list| list.nodes.len()).collect();
+    let first_ports: Vec<usize> = port_counts
+        .iter()
+        .scan(0, |next, count| {
+            Some(std::mem::replace(next, *next + count))
+        })
+        .collect();
     for &(a, b, stiffness) in &pairs {
         for (own, other) in [(a, b), (b, a)] {
-            lists[own.0].partners[ports[&own]].push(Partner {
-                group: other.0,
+            let node = ports[&own] - first_ports[own.0];
+            lists[own.0].partners[node].push(Partner {
                 port: ports[&other],
                 stiffness,
             });
@@ -162,18 +169,17 @@ fn link_pairs(
             let floor = end(under.patch, under.patch_node);
             FloorNode {
                 lane: at.lane as u32,
-                group: floor.0 as u32,
                 port: ports[&floor] as u32,
                 ..under
             }
         }));
     }
     let links = lists.into_iter().zip(floors);
-    for (index, (group, (pairs, floor))) in groups.iter_mut().zip(links).enumerate() {
-        group.set_pairs(index, pairs);
+    for ((group, first_port), (pairs, floor)) in groups.iter_mut().zip(first_ports).zip(links) {
+        group.set_pairs(first_port, pairs);
         group.set_floor(floor);
     }
-    !pairs.is_empty()
+    Ports::new(port_counts)
 }
 
 /// Stiffness of a pair of nodes of two patches. [mass/s^2]
@@ -183,7 +189,7 @@ pub(super) fn pair_stiffness(patches: &[ClothPatch], ends: [usize; 2], strength:
 }
 
 /// What lies under each node of a pad: the node it is stitched to, or else that of the nearest
-/// node that is stitched to one. Lane, group and port are left to be filled in.
+/// node that is stitched to one. Lane and port are left to be filled in.
 pub(super) fn floor_under(pad: &ClothPatch) -> GroupFloor {
     if pad.material.pressure <= 0.0 {
         return GroupFloor::new();
@@ -211,7 +217,6 @@ pub(super) fn floor_under(pad: &ClothPatch) -> GroupFloor {
                 over,
                 patch,
                 patch_node,
-                group: 0,
                 port: 0,
             })
         })

@@ -45,7 +45,7 @@ impl SeenNodes {
 /// Runs all substeps of a frame, with `hook` moving nodes after some of them.
 pub(super) fn advance_hooked(
     groups: &mut [Box<dyn PatchGroup>],
-    ports: &mut [Vec<Ports>; 2],
+    ports: &mut [Ports; 2],
     substeps: &[Substep],
     layout: &[PatchLayout],
     hook: &mut dyn SubstepHook,
@@ -60,7 +60,7 @@ pub(super) fn advance_hooked(
     seen.patches.iter().for_each(|at| is_seen[at.group] = true);
     groups
         .par_iter_mut()
-        .zip(now.par_iter_mut())
+        .zip(now.split())
         .for_each(|(g, p)| g.predict(first, p));
     // Calls are spread evenly over the frame.
     let count = substeps.len();
@@ -68,7 +68,7 @@ pub(super) fn advance_hooked(
     let mut called = 0;
     for (k, substep) in substeps.iter().enumerate() {
         let is_called = !seen.patches.is_empty() && (k + 1) * calls / count > k * calls / count;
-        let shared: &[Ports] = now;
+        let shared: &Ports = now;
         groups
             .par_iter_mut()
             .zip(&is_seen)
@@ -92,7 +92,7 @@ pub(super) fn advance_hooked(
         let following = substeps.get(k + 1);
         groups
             .par_iter_mut()
-            .zip(next.par_iter_mut())
+            .zip(next.split())
             .for_each(|(g, p)| match following {
                 Some(following) => g.turn(following, p),
                 None => g.finish(),

@@ -155,7 +155,10 @@ pub enum Integrator {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
-    /// f32, patches of one shape side by side in SIMD lanes.
+    /// f32, patches of one shape side by side in SIMD lanes. Positions are rounded to some
+    /// 1e-6 mm a substep, whose share in velocities grows as substeps get shorter: cloth that
+    /// nothing damps, in 256 of them a frame, is shaken by it as much as by its targets. More
+    /// than 64 are a case for [`Precision::Double`].
     Single,
     /// f32, patch by patch.
     SingleScalar,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::assembly::{Assembly, PatchLayout, assemble};
 use super::error::ClothError;
-use super::group::{Monitor, PatchGroup, Ports, Substep};
+use super::group::{Monitor, OwnPorts, PatchGroup, Ports, Substep};
 use super::guard::Guard;
 use super::hook::SubstepHook;
 use super::hooked::{SeenNodes, advance_hooked};
@@ -25,8 +25,8 @@ pub struct Cloth {
     options: ClothOptions,
     layout: Vec<PatchLayout>,
     groups: Vec<Box<dyn PatchGroup>>,
-    /// Ports of each group, and those of the next substep.
-    ports: [Vec<Ports>; 2],
+    /// Ports of all groups, and those of the next substep.
+    ports: [Ports; 2],
     has_pairs: bool,
     /// Groups that sleep.
     asleep: Vec<bool>,
@@ -110,9 +110,9 @@ impl Cloth {
         let Assembly {
             groups,
             layout,
-            has_pairs,
+            ports,
         } = assemble(patches, options);
-        let empty_ports = vec![Ports::default(); groups.len()];
+        let has_pairs = !ports.is_empty();
         Ok(Self {
             options: *options,
             positions: patches.iter().map(|p| p.rest.clone()).collect(),
@@ -121,7 +121,7 @@ impl Cloth {
             asleep: vec![false; groups.len()],
             dreams: vec![Dream::default(); patches.len()],
             dreamt: [(); 2].map(|()| vec![PatchMotion::default(); patches.len()]),
-            ports: [empty_ports.clone(), empty_ports],
+            ports: [ports.clone(), ports],
             has_pairs,
             layout,
             groups,
@@ -264,6 +264,7 @@ impl Cloth {
                 .filter(|(_, asleep)| !**asleep)
                 .for_each(|((g, m), _)| g.end_frame(m));
         } else {
+            let none = Ports::default();
             self.groups
                 .par_iter_mut()
                 .zip(monitors)
@@ -271,14 +272,13 @@ impl Cloth {
                 .filter(|(_, asleep)| !**asleep)
                 .for_each(|((group, monitor), _)| {
                     group.begin_frame(dt, targets, anchors);
-                    let mut none = Ports::default();
                     for (k, substep) in substeps.iter().enumerate() {
                         if k == 0 {
-                            group.predict(substep, &mut none);
+                            group.predict(substep, OwnPorts::none(&mut 0));
                         } else {
-                            group.turn(substep, &mut none);
+                            group.turn(substep, OwnPorts::none(&mut 0));
                         }
-                        group.solve(substep, &[]);
+                        group.solve(substep, &none);
                     }
                     group.finish();
                     group.end_frame(monitor);
@@ -365,12 +365,13 @@ impl Cloth {
     /// - `dt`: duration of the frame (s)
     fn send_to_sleep(&mut self, held: &[bool], dt: f64) {
         let mut has_changed = false;
-        let [now, next] = &mut self.ports;
-        for (index, group) in self.groups.iter_mut().enumerate() {
+        let [now, next] = self.ports.each_mut().map(Ports::split);
+        let groups = self.groups.iter_mut().zip(now).zip(next);
+        for (index, ((group, now), next)) in groups.enumerate() {
             let sleeps = sleeps(group.patches(), held);
             match (self.asleep[index], sleeps) {
                 (false, true) => {
-                    group.fall_asleep([&mut now[index], &mut next[index]]);
+                    group.fall_asleep([now, next]);
                     for &patch in group.patches() {
                         self.dreams[patch].is_new = true;
                     }
@@ -482,7 +483,7 @@ fn awake<'a>(
 /// Runs all substeps with the groups in step, as pairs couple them.
 fn advance_together(
     groups: &mut [Box<dyn PatchGroup>],
-    ports: &mut [Vec<Ports>; 2],
+    ports: &mut [Ports; 2],
     substeps: &[Substep],
     asleep: &[bool],
 ) {
@@ -492,16 +493,16 @@ fn advance_together(
     };
     groups
         .par_iter_mut()
-        .zip(now.par_iter_mut())
+        .zip(now.split())
         .zip(asleep)
         .filter(|(_, asleep)| !**asleep)
         .for_each(|((g, p), _)| g.predict(first, p));
     for (k, substep) in substeps.iter().enumerate() {
         let following = substeps.get(k + 1);
-        let shared: &[Ports] = now;
+        let shared: &Ports = now;
         groups
             .par_iter_mut()
-            .zip(next.par_iter_mut())
+            .zip(next.split())
             .zip(asleep)
             .filter(|(_, asleep)| !**asleep)
             .for_each(|((g, p), _)| {

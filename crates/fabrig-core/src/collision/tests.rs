@@ -4,7 +4,9 @@
     reason = "a test that cannot go on should fail there"
 )]
 
+mod random;
 mod strides;
+mod woven;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -238,79 +240,5 @@ fn half_the_length_in_one_frame_folds_nothing_through() {
     for frame in 0..12 {
         let (verdict, _) = scene.frame(&targets, &[]);
         assert_eq!(crossings_of(verdict), 0, "frame {frame}: {verdict:?}");
-    }
-}
-
-/// A shape, a size and a way of its own for every seed.
-fn random_collider(random: &mut rand_chacha::ChaCha8Rng, index: usize) -> Collider {
-    use rand::RngExt;
-    let mut size = || random.random_range(2.0..7.0);
-    let shape = match index % 4 {
-        0 => ColliderShape::Ball { radius: size() },
-        1 => ColliderShape::Capsule {
-            half_length: size(),
-            radius: size(),
-        },
-        2 => ColliderShape::Cuboid {
-            half_extents: Vector::new(size(), 0.1 * size(), size()),
-        },
-        _ => ColliderShape::ConvexHull {
-            points: (0..8)
-                .map(|_| Point::new(size() - 4.5, size() - 4.5, size() - 4.5))
-                .collect(),
-        },
-    };
-    Collider::at("it", shape, Vector::new(0.0, 0.0, 60.0))
-}
-
-#[test]
-fn nothing_crosses_in_random_scenes() {
-    use rand::{RngExt, SeedableRng};
-    // Many are for a night; a few tell of a mistake.
-    let asked = std::env::var("FABRIG_CONTACT_SCENES").ok();
-    let count: u64 = asked.and_then(|text| text.parse().ok()).unwrap_or(8);
-    // In scene 53 hundreds of nodes are carried along.
-    for seed in (0..count).chain((count <= 53).then_some(53)) {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let heights = [2.0, 0.7, -0.7];
-        let sheets = heights
-            .iter()
-            .map(|h| {
-                sheet(
-                    random.random_range(7..12),
-                    24.0,
-                    *h,
-                    random.random_range(0.5..4.0),
-                )
-            })
-            .collect();
-        let collider = random_collider(&mut random, seed as usize);
-        let mut scene = Scene::new(sheets, vec![collider]);
-        let rest = scene.targets.clone();
-        let mut position = Vector::new(0.0, 0.0, 60.0);
-        for frame in 0..14 {
-            let mut wave = || random.random_range(-1.0..1.0_f32);
-            let (a, b, c, d) = (wave(), wave(), wave(), wave());
-            let targets: Vec<_> = rest
-                .iter()
-                .map(|p| {
-                    let lift = 6.0 * a * (0.3 * p.x + 3.0 * b).sin() * (1.0 - p.z * c);
-                    Point3::new(p.x * (1.0 + 0.4 * d), p.y, p.z * (1.0 + 3.0 * c) + lift)
-                })
-                .collect();
-            let mut jump = |size: f64| random.random_range(-size..size);
-            let goal = Vector::new(jump(10.0), jump(10.0), jump(6.0));
-            // Up to 10 m/s, that is 167 mm a frame.
-            position = if frame == 0 { position } else { goal };
-            let turn = Vector::new(jump(0.5), jump(0.5), jump(0.5));
-            let pose = Isometry3::new(position, turn);
-            let (verdict, _) = scene.frame(&targets, &[pose]);
-            let report = scene.contact.report();
-            assert_eq!(
-                crossings_of(verdict),
-                0,
-                "seed {seed}, frame {frame}: {verdict:?}, {report:?}"
-            );
-        }
     }
 }

@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::descent::merge;
-use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Ports, Substep};
+use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Substep};
 use super::pairs::PairTable;
+use super::ports::{OwnPorts, Ports};
 use super::state::{FARTHEST, Group};
 use crate::cloth::input::{Mode, PatchMotion};
 use crate::cloth::report::Energies;
@@ -16,8 +17,8 @@ impl<R: Real> PatchGroup for Group<R> {
         &self.patches
     }
 
-    fn set_pairs(&mut self, group: usize, pairs: GroupPairs) {
-        self.pairs = PairTable::new(group, &pairs);
+    fn set_pairs(&mut self, first_port: usize, pairs: GroupPairs) {
+        self.pairs = PairTable::new(first_port, &pairs);
     }
 
     fn set_floor(&mut self, floor: GroupFloor) {
@@ -61,14 +62,14 @@ impl<R: Real> PatchGroup for Group<R> {
         vectorized(BeginFrame(self, dt));
     }
 
-    fn predict(&mut self, substep: &Substep, ports: &mut Ports) {
+    fn predict(&mut self, substep: &Substep, ports: OwnPorts<'_>) {
         vectorized(Predict(self, substep));
         self.write_ports(ports);
     }
 
-    fn solve(&mut self, substep: &Substep, ports: &[Ports]) {
+    fn solve(&mut self, substep: &Substep, ports: &Ports) {
         vectorized(SolvePairs(self, ports));
-        self.place_floor(substep.progress[1], ports);
+        vectorized(PlaceFloor(self, (substep.progress[1], ports)));
         let sweeps = self.sweeps;
         let robust_count = (self.lane_states.iter())
             .filter(|s| s.robust_frames > 0)
@@ -163,7 +164,7 @@ impl<R: Real> PatchGroup for Group<R> {
         vectorized(Finish(self));
     }
 
-    fn turn(&mut self, following: &Substep, ports: &mut Ports) {
+    fn turn(&mut self, following: &Substep, ports: OwnPorts<'_>) {
         vectorized(Turn(self, following));
         self.write_ports(ports);
     }
@@ -209,7 +210,7 @@ impl<R: Real> PatchGroup for Group<R> {
         }
     }
 
-    fn fall_asleep(&mut self, ports: [&mut Ports; 2]) {
+    fn fall_asleep(&mut self, ports: [OwnPorts<'_>; 2]) {
         for ports in ports {
             self.write_sleeping_ports(ports);
         }
@@ -285,7 +286,11 @@ vectorized_work!(
 );
 vectorized_work!(BeginFrame<f64> -> (), |group, dt| group.begin_frame_lanes(dt));
 vectorized_work!(Predict<&'a Substep> -> (), |group, substep| group.predict_lanes(substep));
-vectorized_work!(SolvePairs<&'a [Ports]> -> (), |group, ports| group.solve_pairs(ports));
+vectorized_work!(SolvePairs<&'a Ports> -> (), |group, ports| group.solve_pairs(ports));
+vectorized_work!(
+    PlaceFloor<(f64, &'a Ports)> -> (),
+    |group, at| group.place_floor(at.0, at.1)
+);
 vectorized_work!(Solve<&'a Substep> -> (), |group, substep| group.solve_lanes(substep));
 vectorized_work!(
     Sweep<(&'a Substep, u32)> -> (),

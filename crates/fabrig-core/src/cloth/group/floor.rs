@@ -1,6 +1,7 @@
 //! Floors: what lies under the pads of a group, whose volume is counted from there.
 
-use super::interface::{GroupFloor, Ports};
+use super::interface::GroupFloor;
+use super::ports::Ports;
 use super::state::Group;
 use crate::cloth::constraints::pressure::{PadFaces, pad_volume};
 use crate::cloth::input::PatchMotion;
@@ -10,6 +11,8 @@ use crate::machine::{Real, Vec3};
 #[derive(Debug, Clone)]
 pub(super) struct Floor<R> {
     nodes: GroupFloor,
+    /// The same in the order of memory: node, lane and the port of what lies under it.
+    under: Vec<[u32; 3]>,
     /// From the targets of the floor to those of the pads at the start and the end of the frame,
     /// one per node; zero over nothing. (mm)
     spans: [Vec<Vec3<R>>; 2],
@@ -27,6 +30,7 @@ impl<R: Real> Floor<R> {
         let zero = vec![Vec3::zero(); node_count];
         Self {
             nodes: GroupFloor::default(),
+            under: Vec::new(),
             spans: [zero.clone(), zero.clone()],
             volumes: [R::splat(0.0); 2],
             heights: zero,
@@ -35,6 +39,9 @@ impl<R: Real> Floor<R> {
     }
 
     pub(super) fn set(&mut self, nodes: GroupFloor) {
+        let under = nodes.iter().map(|n| [n.node, n.lane, n.port]);
+        self.under = under.collect();
+        self.under.sort_unstable();
         self.nodes = nodes;
     }
 
@@ -85,9 +92,9 @@ impl<R: Real> Group<R> {
     ///
     /// - `progress`: how far through the frame, 0 to 1
     #[inline(always)]
-    pub(super) fn place_floor(&mut self, progress: f64, ports: &[Ports]) {
+    pub(super) fn place_floor(&mut self, progress: f64, ports: &Ports) {
         let floor = &mut self.floor;
-        if floor.nodes.is_empty() {
+        if floor.under.is_empty() {
             return;
         }
         let progress = R::splat(progress);
@@ -96,9 +103,9 @@ impl<R: Real> Group<R> {
             *height = *start + (*end - *start) * progress;
         }
         floor.rest = floor.volumes[0] + (floor.volumes[1] - floor.volumes[0]) * progress;
-        for under in &floor.nodes {
-            let [x, y, z, _] = ports[under.group as usize].displacements[under.port as usize];
-            let (height, lane) = (&mut floor.heights[under.node as usize], under.lane as usize);
+        for &[node, lane, port] in &floor.under {
+            let [x, y, z, _] = ports.displacements[port as usize];
+            let (height, lane) = (&mut floor.heights[node as usize], lane as usize);
             height.x.set_lane(lane, height.x.lane(lane) - x);
             height.y.set_lane(lane, height.y.lane(lane) - y);
             height.z.set_lane(lane, height.z.lane(lane) - z);

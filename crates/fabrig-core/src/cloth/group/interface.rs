@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::cloth::constraints::attachment::{PairEnd, PairVector};
+use super::ports::{OwnPorts, Ports};
 use crate::cloth::input::PatchMotion;
 use crate::cloth::report::Energies;
 
@@ -29,7 +29,8 @@ pub(crate) struct Substep {
 /// The pairs of a group's nodes with nodes of other patches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GroupPairs {
-    /// (node, lane) of every node that has pairs: the ports of the group.
+    /// (node, lane) of every node that has pairs: the ports of the group. Those with equally many
+    /// partners follow each other.
     pub(crate) nodes: Vec<(u32, u32)>,
     /// Partners of each such node.
     pub(crate) partners: Vec<Vec<Partner>>,
@@ -38,9 +39,7 @@ pub(crate) struct GroupPairs {
 /// The other end of a pair.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Partner {
-    /// Its group.
-    pub(crate) group: usize,
-    /// Its index among the ports of that group.
+    /// Its index among the ports of all groups.
     pub(crate) port: usize,
     /// k. [mass/s^2]
     pub(crate) stiffness: f64,
@@ -61,20 +60,8 @@ pub(crate) struct FloorNode {
     /// Patch of the floor, and its node.
     pub(crate) patch: usize,
     pub(crate) patch_node: u32,
-    /// Its group, and its index among the ports of that.
-    pub(crate) group: u32,
+    /// Its index among the ports of all groups.
     pub(crate) port: u32,
-}
-
-/// What a group tells the others of its paired nodes.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Ports {
-    /// Predicted displacement of each from its target. (mm)
-    pub(crate) displacements: Vec<PairVector>,
-    /// What each brings into its pairs.
-    pub(crate) ends: Vec<PairEnd>,
-    /// How often the masses have changed; for these [`Ports::ends`] hold.
-    pub(crate) version: u64,
 }
 
 /// What the energy monitor looks at, per patch.
@@ -101,8 +88,8 @@ pub(crate) struct Monitor {
 pub(crate) trait PatchGroup: Send + Sync {
     /// Patches of the lanes.
     fn patches(&self) -> &[usize];
-    /// Replaces the pairs; `group` is this one's index.
-    fn set_pairs(&mut self, group: usize, pairs: GroupPairs);
+    /// Replaces the pairs, whose own ends are the ports from `first_port` on.
+    fn set_pairs(&mut self, first_port: usize, pairs: GroupPairs);
     /// Replaces what lies under its pads.
     fn set_floor(&mut self, floor: GroupFloor);
     /// Puts the cloth on the targets, moving with them.
@@ -110,9 +97,9 @@ pub(crate) trait PatchGroup: Send + Sync {
     /// Starts a frame of `dt` seconds.
     fn begin_frame(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);
     /// Before the constraints of a substep: up to the inertial target. Fills `ports`.
-    fn predict(&mut self, substep: &Substep, ports: &mut Ports);
+    fn predict(&mut self, substep: &Substep, ports: OwnPorts<'_>);
     /// The constraints of a substep. Reads the ports of all groups.
-    fn solve(&mut self, substep: &Substep, ports: &[Ports]);
+    fn solve(&mut self, substep: &Substep, ports: &Ports);
     /// Whether a hook has the last word on positions from now on.
     fn set_hooked(&mut self, is_hooked: bool);
     /// After the constraints: holds steps back as the end of the substep would without a hook.
@@ -137,14 +124,14 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn finish(&mut self);
     /// [`PatchGroup::finish`], and then [`PatchGroup::predict`] for the substep that follows in
     /// the same frame, in one pass.
-    fn turn(&mut self, following: &Substep, ports: &mut Ports);
+    fn turn(&mut self, following: &Substep, ports: OwnPorts<'_>);
     /// Ends the frame: what the monitor sees, per patch.
     fn end_frame(&mut self, monitors: &mut Vec<Monitor>);
     /// Takes backward Euler steps for a patch for `frames` frames, solved by descent if
     /// `is_robust`.
     fn fall_back(&mut self, lane: usize, frames: u32, is_robust: bool);
     /// Tells the other groups that this one's nodes keep their displacement from now on.
-    fn fall_asleep(&mut self, ports: [&mut Ports; 2]);
+    fn fall_asleep(&mut self, ports: [OwnPorts<'_>; 2]);
     /// Wakes at the end of a frame of `dt` seconds that led to `targets`: nodes have kept their
     /// displacement, and move as their targets do.
     fn wake(&mut self, dt: f64, targets: &[PatchMotion], anchors: &[PatchMotion]);

@@ -11,12 +11,14 @@ mod frame;
 mod interface;
 mod pairs;
 mod paper;
+mod ports;
 mod solve;
 mod state;
 mod substep;
 mod sweeps;
 
 pub(crate) use interface::{
-    FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Ports, Substep,
+    FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Substep,
 };
+pub(crate) use ports::{OwnPorts, Ports};
 pub(crate) use state::Group;

@@ -3,74 +3,44 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::sheet;
-use crate::cloth::{Cloth, ClothOptions, ClothPatch, FrameInput, GridShape, Material, PatchMotion};
-use crate::collision::{Collider, ColliderShape, Contact, ContactOptions, PairMask};
+use super::woven::Woven;
+use crate::cloth::Material;
+use crate::collision::{Collider, ColliderShape};
 
-const DT: f64 = 1.0 / 60.0;
 const COUNT: u32 = 12;
 const STRIDES: [u32; 4] = [1, 2, 3, 5];
 
 /// A sheet over a plate, which stands where its top is at z = 0.
 struct Press {
-    cloth: Cloth,
-    contact: Contact,
+    woven: Woven,
     rest: Vec<Point3<f32>>,
-    targets: PatchMotion,
     plate: Isometry3<f64>,
 }
 
 impl Press {
     fn new(every: u32, height: f32) -> Self {
         let patch = sheet(COUNT, 30.0, height, 0.0);
-        let cloth = ClothPatch {
-            shape: GridShape {
-                u_count: COUNT,
-                v_count: COUNT,
-                is_periodic: false,
-            },
-            rest: patch.rest.clone(),
-            material: Material::LINEAR_MUSCLE,
-            attachments: Vec::new(),
-            variations: Vec::new(),
-        };
         // A plane is everything below its own +y.
         let turn = Vector3::x() * std::f64::consts::FRAC_PI_2;
-        let plate = Isometry3::new(Vector3::zeros(), turn);
         let mut collider = Collider::at("plate", ColliderShape::Plane {}, Vector3::zeros());
         collider.keys[0].rotation = turn;
-        let options = ContactOptions {
-            pairs: PairMask::All,
-            every,
-            ..ContactOptions::default()
-        };
         let rest = patch.rest.clone();
-        let targets = PatchMotion::still(&rest);
-        let mut contact = Contact::new(&[patch], &[], &[collider], &options).unwrap();
-        let mut cloth = Cloth::new(&[cloth], &ClothOptions::default()).unwrap();
-        contact.begin_frame(&[], &[plate]);
-        let still = std::slice::from_ref(&targets);
-        cloth.reset_with(still, &[], &mut contact).unwrap();
         Self {
-            cloth,
-            contact,
+            woven: Woven::new(&[patch], vec![collider], every),
             rest,
-            targets,
-            plate,
+            plate: Isometry3::new(Vector3::zeros(), turn),
         }
     }
 
     /// A frame in which the targets go to `height` over where they rest.
     fn frame(&mut self, height: f32) {
-        for (target, rest) in self.targets.positions.iter_mut().zip(&self.rest) {
-            *target = rest + Vector3::z() * height;
-        }
-        self.contact.begin_frame(&[], &[self.plate]);
-        let input = FrameInput::new(DT, std::slice::from_ref(&self.targets));
-        self.cloth.step_with(&input, &mut self.contact).unwrap();
+        let targets = self.rest.iter().map(|rest| rest + Vector3::z() * height);
+        let targets: Vec<_> = targets.collect();
+        self.woven.frame(&targets, &[self.plate]);
     }
 
     fn heights(&self) -> impl Iterator<Item = f32> {
-        self.cloth.positions(0).iter().map(|p| p.z)
+        self.woven.cloth.positions(0).iter().map(|p| p.z)
     }
 }
 
@@ -83,7 +53,7 @@ fn a_held_press_pushes_as_hard_as_its_magnets_pull_and_comes_to_rest() {
             // Down in a fifth of a second, then held.
             press.frame(-depth * (frame as f32 / 12.0).min(1.0));
         }
-        let contact = press.contact.report();
+        let contact = press.woven.contact.report();
         assert_eq!(contact.contacts, press.rest.len());
         // Newtons of nodes of 0.04 g whose magnets are drawn out.
         let node = 0.04e-6 * Material::LINEAR_MUSCLE.magnet_stiffness();
@@ -91,14 +61,14 @@ fn a_held_press_pushes_as_hard_as_its_magnets_pull_and_comes_to_rest() {
         assert!(lowest > -1e-3, "every {every}: {lowest} mm");
         let drawn: f64 = press
             .heights()
-            .zip(&press.targets.positions)
+            .zip(&press.woven.targets[0].positions)
             .map(|(z, target)| f64::from(z - target.z))
             .sum();
         let force = -contact.forces[0].z;
         let ratio = force / (node * drawn);
         // Spans of unequal length, as at 2 and 5, are off by the most.
         assert!((ratio - 1.0).abs() < 0.1, "every {every}: {ratio}");
-        let kinetic = press.cloth.patch_energies(0).kinetic;
+        let kinetic = press.woven.cloth.patch_energies(0).kinetic;
         assert!(kinetic < 1e-3, "every {every}: {kinetic}");
     }
 }
