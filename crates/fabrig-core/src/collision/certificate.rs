@@ -12,6 +12,8 @@
 //! Where neither holds, the pair has a list of its elements that are near each other, from which
 //! the second certificate comes, and those that may close are contacts to be.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use super::distance::PairKind;
@@ -79,6 +81,9 @@ pub(crate) struct NearElements {
     pass: f32,
     /// Up to which gap the next list shall go. (mm)
     pub(crate) wish: f32,
+    /// Which collection looked at these tiles last, and what it found among its actives.
+    pub(crate) collection: u64,
+    pub(crate) found: Range<usize>,
 }
 
 impl TilePair {
@@ -98,6 +103,8 @@ impl TilePair {
                 stamp: 0,
                 pass: 0.0,
                 wish: LIST_REACH,
+                collection: 0,
+                found: 0..0,
             }),
         }
     }

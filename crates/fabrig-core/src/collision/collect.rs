@@ -109,15 +109,19 @@ impl Contact {
         self.collect_pushed();
     }
 
-    /// Finds the same for tiles that are pushed, with allowance.
+    /// Finds the same for tiles that are pushed, with allowance. What was found before in this
+    /// pass is still so for tiles in which nothing was pushed since.
     pub(super) fn collect_pushed(&mut self) {
-        self.actives.clear();
         if !self.is_any_pushed {
+            self.actives.clear();
             return;
         }
+        let before = self.collection;
+        self.collection += 1;
         let more = 2.0 * MARGIN;
         let mut lists = std::mem::take(&mut self.lists);
-        let mut actives = std::mem::take(&mut self.actives);
+        let old = std::mem::take(&mut self.actives);
+        let mut actives = Vec::with_capacity(old.len());
         for (index, list) in lists.iter_mut().enumerate() {
             let watch = &self.watch;
             if !watch.is_pushed[list.a] && !watch.is_pushed[list.b] {
@@ -128,10 +132,25 @@ impl Contact {
                 if !pair.tiles.iter().any(|&t| self.is_pushed[t as usize]) {
                     continue;
                 }
+                let first = actives.len();
+                let is_known = pair.near.collection == before
+                    && pair
+                        .tiles
+                        .iter()
+                        .all(|&t| self.changed[t as usize] < before);
+                if is_known {
+                    actives.extend_from_slice(&old[pair.near.found.clone()]);
+                    pair.near.collection = self.collection;
+                    pair.near.found = first..actives.len();
+                    continue;
+                }
                 self.watch.catch_up(pair);
-                if pair.clearance(&self.watch.way_of(pair)) > more as f32
-                    || !self.has_list(list, pair, more as f32)
-                {
+                if pair.clearance(&self.watch.way_of(pair)) > more as f32 {
+                    continue;
+                }
+                pair.near.collection = self.collection;
+                pair.near.found = first..first;
+                if !self.has_list(list, pair, more as f32) {
                     continue;
                 }
                 self.find_closing(pair, more);
@@ -153,6 +172,7 @@ impl Contact {
                         push: 0.0,
                     });
                 }
+                pair.near.found = first..actives.len();
             }
             list.pairs = pairs;
         }
@@ -167,6 +187,7 @@ impl Contact {
         let mut any = false;
         for &t in self.tiles.of_node(node) {
             any |= !std::mem::replace(&mut self.is_pushed[t as usize], true);
+            self.changed[t as usize] = self.collection;
         }
         any
     }

@@ -11,6 +11,7 @@ use super::sticky::{Bond, Lip};
 use super::tile::{Extent, Tiles, Way};
 use super::tile_shape::TileShape;
 use super::world::WorldCollider;
+use super::zones::Zones;
 use super::{
     Collider, CollisionError, ContactOptions, ContactPoint, ContactReport, PairMask, StarSurface,
 };
@@ -98,8 +99,18 @@ pub struct Contact {
     /// Tiles in which something is pushed in this pass, and whether there are any.
     pub(super) is_pushed: Vec<bool>,
     pub(super) is_any_pushed: bool,
+    /// Collections of actives until now, and how many there were when something in each tile was
+    /// pushed last.
+    pub(super) collection: u64,
+    pub(super) changed: Vec<u64>,
     /// Nodes that were moved from where they were wanted in this substep.
     pub(super) altered: Vec<u32>,
+    /// Nodes that go together in this pass.
+    pub(super) zones: Zones,
+    /// How many of them the ways of tiles have been told of in this pass.
+    pub(super) followed: usize,
+    /// The pass in which each node was touched last.
+    pub(super) touched: Vec<u64>,
     pub(super) lists: Vec<PairList>,
     /// Bodies of the face, then colliders.
     pub(super) world: Vec<WorldCollider>,
@@ -224,7 +235,12 @@ impl Contact {
             watch: Watch::new(tiles.len(), parts.len()),
             is_pushed: vec![false; tiles.len()],
             is_any_pushed: false,
+            collection: 0,
+            changed: vec![0; tiles.len()],
             altered: Vec::new(),
+            zones: Zones::default(),
+            followed: 0,
+            touched: vec![0; rest.len()],
             shapes: vec![TileShape::UNKNOWN; tiles.len()],
             moment: 0,
             workbench: Workbench::default(),

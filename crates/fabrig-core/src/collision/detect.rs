@@ -192,7 +192,7 @@ impl Contact {
     /// Takes what was altered in this pass into the ways of tiles.
     pub(super) fn follow(&mut self) {
         self.watch.stamp += 1;
-        for &node in &self.altered {
+        for &node in &self.altered[self.followed..] {
             let n = node as usize;
             let by = self.wanted[n] - self.reference[n];
             for &t in self.tiles.of_node(node) {
@@ -204,6 +204,7 @@ impl Contact {
                 watch.is_stale |= !watch.rooms[t].holds(&both);
             }
         }
+        self.followed = self.altered.len();
         if self.watch.is_stale {
             self.renew(true);
         }

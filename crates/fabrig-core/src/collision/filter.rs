@@ -3,11 +3,14 @@
 //! After contacts are projected, every pair that could have met is followed along its straight
 //! way by conservative advancement: its distance can fall by no more than its nodes move
 //! against each other. A pair that would lose nine tenths of its distance is not safe. Its
-//! nodes are then held back: half the way, and after some rounds no way at all; where they
-//! stood nothing crossed. A collider cannot be held back, so nodes in front of it are carried
+//! nodes are then held back: half the way, after some rounds a way that is the same for all of
+//! them ([`super::zones`]), and at last no way at all; where they stood nothing crossed. A
+//! collider cannot be held back, so nodes in front of it are carried
 //! along with it instead, and what they meet is carried too.
 //!
 //! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
+
+use nalgebra::Vector3;
 
 use super::contact::Contact;
 use super::detect::MARGIN;
@@ -16,8 +19,10 @@ use super::plane::approach;
 use super::project::{Active, narrow};
 use crate::Vector;
 
-/// Rounds in which ways are halved, before nodes are held.
+/// Rounds in which ways are halved, before nodes go together.
 const HALVINGS: usize = 6;
+/// Rounds in which they do, before they are held.
+const JOININGS: usize = 12;
 /// Share of its distance that a pair keeps in a pass.
 const KEPT: f64 = 0.1;
 /// Pairs nearer than this come no nearer: stored positions are not finer. (mm)
@@ -36,6 +41,9 @@ impl Contact {
             self.watch.is_pushed.fill(false);
         }
         self.moment += 1;
+        // What the last pass collected is of another way.
+        self.collection += 1;
+        self.followed = self.altered.len();
         self.refresh_pairs();
         self.collect_smooth();
         let bonds = std::mem::take(&mut self.bonds);
@@ -59,15 +67,16 @@ impl Contact {
 
     /// Projects, and returns whether nodes went further than collecting allowed for.
     fn project_within(&mut self, force_per_shift: f64) -> bool {
-        let mut touched: Vec<(u32, Vector)> = Vec::with_capacity(4 * self.actives.len());
-        touched.extend(
-            (self.actives.iter())
-                .flat_map(|a| a.nodes)
-                .chain(self.smooth.iter().map(|s| s.node))
-                .chain(self.bonds.iter().flat_map(|b| b.nodes))
-                .filter(|&n| (n as usize) < self.cloth_count)
-                .map(|n| (n, wide(&self.wanted[n as usize]))),
-        );
+        let (moment, last) = (self.moment, &mut self.touched);
+        let touched: Vec<(u32, Vector)> = (self.actives.iter())
+            .flat_map(|a| a.nodes)
+            .chain(self.smooth.iter().map(|s| s.node))
+            .chain(self.bonds.iter().flat_map(|b| b.nodes))
+            .filter(|&n| (n as usize) < self.cloth_count)
+            // A node is of many pairs.
+            .filter(|&n| std::mem::replace(&mut last[n as usize], moment) != moment)
+            .map(|n| (n, wide(&self.wanted[n as usize])))
+            .collect();
         self.project(force_per_shift);
         let mut went_far = false;
         for (node, before) in touched {
@@ -82,7 +91,7 @@ impl Contact {
     }
 
     fn make_safe(&mut self, mut went_far: bool) {
-        let mut halved = 0;
+        let (mut halved, mut has_zones) = (0, false);
         loop {
             if went_far {
                 // What was pushed may now meet what was not looked at.
@@ -94,10 +103,11 @@ impl Contact {
                     .collect();
                 self.follow();
                 self.collect_pushed();
-                self.remember(&pushes);
+                self.remember(pushes);
                 went_far = false;
             }
             let mut unsafe_count = 0;
+            let mut is_joined = false;
             let actives = std::mem::take(&mut self.actives);
             for a in &actives {
                 if self.is_safe(a) {
@@ -114,6 +124,14 @@ impl Contact {
                     }
                 }
                 self.report.held += 1;
+                if !std::mem::replace(&mut has_zones, true) {
+                    self.zones.begin(&self.wanted[..self.cloth_count]);
+                }
+                let is_cloth = a.nodes.iter().all(|&n| (n as usize) < self.cloth_count);
+                if is_cloth && (HALVINGS..HALVINGS + JOININGS).contains(&halved) {
+                    is_joined |= self.zones.join(&a.nodes);
+                    continue;
+                }
                 for n in a.nodes {
                     let i = n as usize;
                     if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
@@ -136,6 +154,14 @@ impl Contact {
                 }
             }
             self.actives = actives;
+            if is_joined {
+                self.go_together();
+                went_far = true;
+            } else if unsafe_count > 0 && (HALVINGS..HALVINGS + JOININGS).contains(&halved) {
+                // Nothing more to join: what is not safe yet is held.
+                halved = HALVINGS + JOININGS;
+                went_far = true;
+            }
             halved += 1;
             if self.carry_out_of_round() {
                 went_far = true;
@@ -150,18 +176,45 @@ impl Contact {
         }
     }
 
-    /// Keeps what pushed before candidates were collected anew, for the report.
-    fn remember(&mut self, pushes: &[Active]) {
-        for p in pushes {
-            match self
-                .actives
-                .iter_mut()
-                .find(|a| a.nodes == p.nodes && a.kind == p.kind)
-            {
-                Some(a) => a.push = p.push,
-                None => self.actives.push(*p),
+    /// Lets the nodes of each zone go the same way.
+    fn go_together(&mut self) {
+        let mut ways: Vec<(u32, Vector3<f32>)> = Vec::new();
+        for (nodes, way) in self.zones.ways(&self.positions) {
+            ways.extend(nodes.iter().map(|&node| (node, way)));
+        }
+        for (node, way) in ways {
+            let i = node as usize;
+            let to = self.positions[i] + way;
+            if self.wanted[i] != to && self.carried_by[i] == u32::MAX {
+                self.wanted[i] = to;
+                self.altered.push(node);
+                self.push_node(node);
             }
         }
+    }
+
+    /// Keeps what pushed before candidates were collected anew, for the report.
+    fn remember(&mut self, mut pushes: Vec<Active>) {
+        let key = |a: &Active| (a.kind, a.nodes);
+        pushes.sort_by_key(key);
+        pushes.dedup_by_key(|a| key(a));
+        // Hardly any active has four nodes that all were pushed.
+        let mut is_pushed = vec![false; self.positions.len()];
+        for node in pushes.iter().flat_map(|p| p.nodes) {
+            is_pushed[node as usize] = true;
+        }
+        let mut is_missing = vec![true; pushes.len()];
+        for a in &mut self.actives {
+            if !a.nodes.iter().all(|&n| is_pushed[n as usize]) {
+                continue;
+            }
+            if let Ok(k) = pushes.binary_search_by_key(&key(a), key) {
+                a.push = pushes[k].push;
+                is_missing[k] = false;
+            }
+        }
+        let missing = pushes.iter().zip(is_missing).filter(|(_, m)| *m);
+        self.actives.extend(missing.map(|(push, _)| *push));
     }
 
     /// The collider of a pair, or the one that carries one of its nodes.
@@ -227,6 +280,10 @@ impl Contact {
     fn is_safe(&self, a: &Active) -> bool {
         let at = places(&a.nodes, &self.positions);
         let to = places(&a.nodes, &self.wanted);
+        let way = to[0] - at[0];
+        if (1..4).all(|k| to[k] - at[k] == way) {
+            return true;
+        }
         stays_beside(a, &to) || stays_apart(a.kind, &at, &to, a.distance)
     }
 }

@@ -55,6 +55,7 @@ mod tile;
 mod tile_shape;
 mod tree;
 mod world;
+mod zones;
 
 #[cfg(test)]
 mod tests;
