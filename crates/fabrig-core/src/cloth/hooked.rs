@@ -142,8 +142,8 @@ fn call(
         let (at, node) = (&seen.patches[patch], i - seen.starts[patch]);
         groups[at.group].shift(at.lane, node, by);
         if is_long {
-            let from = (moved.from, span.progress[0]);
-            groups[at.group].straighten(at.lane, node, from, [elapsed, span.h]);
+            let (from, times) = (moved.from, [elapsed, span.h]);
+            groups[at.group].straighten(at.lane, node, from, span.progress, times);
         }
     }
     for ((at, &squared), &stopped) in seen.patches.iter().zip(&squared).zip(hook.stopped()) {

@@ -44,6 +44,15 @@ pub(crate) fn hermite(s: f64) -> [f64; 3] {
     ]
 }
 
+/// Derivatives of [`hermite`] by the progress.
+pub(crate) fn hermite_slope(s: f64) -> [f64; 3] {
+    [
+        6.0 * s * (1.0 - s),
+        (1.0 - s) * (1.0 - 3.0 * s),
+        s * (3.0 * s - 2.0),
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,6 +89,9 @@ mod tests {
             let [c, a, b] = hermite(s);
             let value = x(0.0) + c * (x(1.0) - x(0.0)) + a * slope(0.0) + b * slope(1.0);
             assert!((value - x(s)).abs() < 1e-14);
+            let [c, a, b] = hermite_slope(s);
+            let rate = c * (x(1.0) - x(0.0)) + a * slope(0.0) + b * slope(1.0);
+            assert!((rate - slope(s)).abs() < 1e-14);
         }
     }
 }

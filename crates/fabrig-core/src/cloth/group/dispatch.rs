@@ -9,7 +9,7 @@ use super::ports::{OwnPorts, Ports};
 use super::state::{FARTHEST, Group};
 use crate::cloth::input::{Mode, PatchMotion};
 use crate::cloth::report::Energies;
-use crate::cloth::time::hermite;
+use crate::cloth::time::{hermite, hermite_slope};
 use crate::machine::{Real, vectorized};
 
 impl<R: Real> PatchGroup for Group<R> {
@@ -122,24 +122,34 @@ impl<R: Real> PatchGroup for Group<R> {
         &mut self,
         lane: usize,
         node: usize,
-        (from, progress): (Point3<f32>, f64),
+        from: Point3<f32>,
+        progress: [f64; 2],
         [elapsed, h]: [f64; 2],
     ) {
         let center = self.origin.lane(lane);
-        let (end, began) = (hermite(1.0), hermite(progress));
-        let left = [0, 1, 2].map(|k| R::splat(end[k] - began[k]));
-        let target = self.ends[node] - self.segments().weighted(node, left);
-        let (target, x) = (target.lane(lane), self.solution[node].lane(lane));
+        let segment = |weights: [f64; 3]| {
+            let weights = weights.map(R::splat);
+            self.segments().weighted(node, weights).lane(lane)
+        };
+        let (end, began) = (hermite(1.0), hermite(progress[0]));
+        let left = segment([0, 1, 2].map(|k| end[k] - began[k]));
+        let (end, x) = (self.ends[node].lane(lane), self.solution[node].lane(lane));
         let goal = self.targets[node].lane(lane);
+        // How fast the target goes now, and went a substep ago. (mm/s)
+        let dt = elapsed / (progress[1] - progress[0]);
+        let rate = |s: f64| segment(hermite_slope(s)).map(|way| way / dt);
+        let rates = [rate(progress[1]), rate(progress[1] - h / dt)];
         let h_e = self.h_e.lane(lane);
         let u = [0, 1, 2].map(|k| x[k] - goal[k]);
+        // Against the target.
         let v = [0, 1, 2].map(|k| {
-            let began = f64::from(from[k]) - center[k] - target[k];
+            let began = f64::from(from[k]) - center[k] - (end[k] - left[k]);
             (u[k] - began) / elapsed
         });
-        self.past[node].set_lane(lane, [0, 1, 2].map(|k| u[k] - v[k] * h_e));
+        let [now, before] = rates.map(|rate| [0, 1, 2].map(|k| v[k] + rate[k]));
+        self.past[node].set_lane(lane, [0, 1, 2].map(|k| u[k] - now[k] * h_e));
         self.displacements[node].set_lane(lane, [0, 1, 2].map(|k| u[k] - v[k] * h));
-        self.velocities[node].set_lane(lane, v);
+        self.velocities[node].set_lane(lane, before);
     }
 
     fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool) {

@@ -110,9 +110,17 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn shift(&mut self, lane: usize, node: usize, by: [f64; 3]);
     /// Lets a node that was shifted go on as if it had gone straight there against its target.
     ///
-    /// - `from`: where it began [mm, head frame], and the progress through the frame then
+    /// - `from`: where it began [mm, head frame]
+    /// - `progress`: through the frame then and now, 0 to 1
     /// - `times`: since then, and of this substep (s)
-    fn straighten(&mut self, lane: usize, node: usize, from: (Point3<f32>, f64), times: [f64; 2]);
+    fn straighten(
+        &mut self,
+        lane: usize,
+        node: usize,
+        from: Point3<f32>,
+        progress: [f64; 2],
+        times: [f64; 2],
+    );
     /// Lets the monitor know that nodes of a patch were moved from outside by `squared`
     /// altogether (mm^2), and forgets its history where that `stopped` it.
     fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool);
