@@ -105,10 +105,10 @@ pub struct Contact {
     pub(super) changed: Vec<u64>,
     /// Nodes that were moved from where they were wanted in this substep.
     pub(super) altered: Vec<u32>,
-    /// Nodes that go together in this pass.
-    pub(super) zones: Zones,
     /// How many of them the ways of tiles have been told of in this pass.
     pub(super) followed: usize,
+    /// Nodes that go together in this pass.
+    pub(super) zones: Zones,
     /// The pass in which each node was touched last.
     pub(super) touched: Vec<u64>,
     pub(super) lists: Vec<PairList>,
@@ -238,8 +238,8 @@ impl Contact {
             collection: 0,
             changed: vec![0; tiles.len()],
             altered: Vec::new(),
-            zones: Zones::default(),
             followed: 0,
+            zones: Zones::default(),
             touched: vec![0; rest.len()],
             shapes: vec![TileShape::UNKNOWN; tiles.len()],
             moment: 0,

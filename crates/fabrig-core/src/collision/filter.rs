@@ -5,8 +5,8 @@
 //! against each other. A pair that would lose nine tenths of its distance is not safe. Its
 //! nodes are then held back: half the way, after some rounds a way that is the same for all of
 //! them ([`super::zones`]), and at last no way at all; where they stood nothing crossed. A
-//! collider cannot be held back, so nodes in front of it are carried
-//! along with it instead, and what they meet is carried too.
+//! collider cannot be held back, so nodes in front of it are carried along with it instead, and
+//! what they meet is carried too.
 //!
 //! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
 

@@ -99,8 +99,8 @@ fn jaw(rig: &Rig, follows: RigidBody, rest: &[Point3<f32>]) -> Option<Body> {
     })
 }
 
-/// Radius a sample beside a direction: without it what lies between a sample that has one and a sample that has
-/// none would have none.
+/// Radius a sample beside a direction: without it what lies between a sample that has one and a
+/// sample that has none would have none.
 fn beside(d: &Vector, hit: impl Fn(&Vector) -> Option<f64>) -> Option<f64> {
     let tilt = std::f64::consts::FRAC_PI_2 / (JAW_SIDE - 1) as f64;
     let across = d.cross(&Vector::y());
