@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::assembly::PatchLayout;
-use super::group::{PatchGroup, Ports, Substep};
+use super::group::{PatchGroup, Ports, Span, Substep};
 use super::hook::{HookSubstep, SubstepHook};
 
 /// Where the nodes that a hook sees come from.
@@ -102,15 +102,6 @@ pub(super) fn advance_hooked(
     groups.iter_mut().for_each(|g| g.set_hooked(false));
 }
 
-/// What has gone by since a hook was called.
-#[derive(Debug, Clone, Copy)]
-struct Span {
-    progress: [f64; 2],
-    substeps: usize,
-    /// Duration of each of them. (s)
-    h: f64,
-}
-
 /// Lets a hook move `nodes`.
 fn call(
     groups: &mut [Box<dyn PatchGroup>],
@@ -122,11 +113,10 @@ fn call(
     let at = &seen.patches[0];
     let [h_e, effective_mass] = groups[at.group].effective_step(at.lane);
     let is_euler = h_e >= span.h;
-    let elapsed = span.h * span.substeps as f64;
     hook.correct(
         &HookSubstep {
             progress: span.progress,
-            h: elapsed,
+            h: span.elapsed(),
             h_e: h_e * response(span.substeps, is_euler, effective_mass).sqrt(),
             effective_mass,
         },
@@ -142,8 +132,7 @@ fn call(
         let (at, node) = (&seen.patches[patch], i - seen.starts[patch]);
         groups[at.group].shift(at.lane, node, by);
         if is_long {
-            let (from, times) = (moved.from, [elapsed, span.h]);
-            groups[at.group].straighten(at.lane, node, from, span.progress, times);
+            groups[at.group].straighten(at.lane, node, moved.from, span);
         }
     }
     for ((at, &squared), &stopped) in seen.patches.iter().zip(&squared).zip(hook.stopped()) {

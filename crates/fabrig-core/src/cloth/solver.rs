@@ -27,7 +27,6 @@ pub struct Cloth {
     groups: Vec<Box<dyn PatchGroup>>,
     /// Ports of all groups, and those of the next substep.
     ports: [Ports; 2],
-    has_pairs: bool,
     /// Groups that sleep.
     asleep: Vec<bool>,
     /// What patches do that sleep, one per patch.
@@ -112,17 +111,15 @@ impl Cloth {
             layout,
             ports,
         } = assemble(patches, options);
-        let has_pairs = !ports.is_empty();
         Ok(Self {
             options: *options,
             positions: patches.iter().map(|p| p.rest.clone()).collect(),
-            guard: Guard::new(patches.len(), has_pairs),
+            guard: Guard::new(patches.len(), !ports.is_empty()),
             monitors: vec![Vec::new(); groups.len()],
             asleep: vec![false; groups.len()],
             dreams: vec![Dream::default(); patches.len()],
             dreamt: [(); 2].map(|()| vec![PatchMotion::default(); patches.len()]),
             ports: [ports.clone(), ports],
-            has_pairs,
             layout,
             groups,
             previous_h: 0.0,
@@ -254,7 +251,7 @@ impl Cloth {
                 .par_iter_mut()
                 .zip(monitors)
                 .for_each(|(g, m)| g.end_frame(m));
-        } else if self.has_pairs {
+        } else if !self.ports[0].is_empty() {
             awake(&mut self.groups, asleep).for_each(|g| g.begin_frame(dt, targets, anchors));
             advance_together(&mut self.groups, &mut self.ports, &substeps, asleep);
             self.groups

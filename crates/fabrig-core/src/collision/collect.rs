@@ -50,6 +50,23 @@ struct Closing {
     between: Vector,
 }
 
+impl Closing {
+    /// As a pair of a list that may meet.
+    fn active(&self, list: u32) -> Active {
+        let distance = self.between.norm();
+        Active {
+            nodes: self.candidate.nodes,
+            kind: self.candidate.kind,
+            weights: self.weights,
+            normal: self.between / distance.max(1e-12),
+            distance,
+            thickness: f64::from(self.candidate.thickness),
+            list,
+            push: 0.0,
+        }
+    }
+}
+
 struct Offer<'a> {
     contact: &'a Contact,
     list: &'a PairList,
@@ -140,38 +157,18 @@ impl Contact {
                         .all(|&t| self.changed[t as usize] < before);
                 if is_known {
                     actives.extend_from_slice(&old[pair.near.found.clone()]);
-                    pair.near.collection = self.collection;
-                    pair.near.found = first..actives.len();
-                    continue;
-                }
-                self.watch.catch_up(pair);
-                if pair.clearance(&self.watch.way_of(pair)) > more as f32 {
-                    continue;
+                } else {
+                    self.watch.catch_up(pair);
+                    if pair.clearance(&self.watch.way_of(pair)) > more as f32 {
+                        continue;
+                    }
+                    if self.has_list(list, pair, more as f32) {
+                        self.find_closing(pair, more);
+                        let closing = self.workbench.closing.iter();
+                        actives.extend(closing.map(|c| c.active(index as u32)));
+                    }
                 }
                 pair.near.collection = self.collection;
-                pair.near.found = first..first;
-                if !self.has_list(list, pair, more as f32) {
-                    continue;
-                }
-                self.find_closing(pair, more);
-                for closing in &self.workbench.closing {
-                    let Candidate {
-                        nodes,
-                        kind,
-                        thickness,
-                    } = closing.candidate;
-                    let distance = closing.between.norm();
-                    actives.push(Active {
-                        nodes,
-                        kind,
-                        weights: closing.weights,
-                        normal: closing.between / distance.max(1e-12),
-                        distance,
-                        thickness: f64::from(thickness),
-                        list: index as u32,
-                        push: 0.0,
-                    });
-                }
                 pair.near.found = first..actives.len();
             }
             list.pairs = pairs;

@@ -10,7 +10,7 @@
 //!
 //! Source: Li et al. 2021, *Codimensional Incremental Potential Contact*, additive CCD.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::contact::Contact;
 use super::detect::MARGIN;
@@ -107,6 +107,7 @@ impl Contact {
                 went_far = false;
             }
             let mut unsafe_count = 0;
+            let is_joining = (HALVINGS..HALVINGS + JOININGS).contains(&halved);
             let mut is_joined = false;
             let actives = std::mem::take(&mut self.actives);
             for a in &actives {
@@ -127,37 +128,19 @@ impl Contact {
                 if !std::mem::replace(&mut has_zones, true) {
                     self.zones.begin(&self.wanted[..self.cloth_count]);
                 }
-                let is_cloth = a.nodes.iter().all(|&n| (n as usize) < self.cloth_count);
-                if is_cloth && (HALVINGS..HALVINGS + JOININGS).contains(&halved) {
+                if is_joining {
+                    // A pair without a collider has nodes of cloth alone.
                     is_joined |= self.zones.join(&a.nodes);
-                    continue;
-                }
-                for n in a.nodes {
-                    let i = n as usize;
-                    if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
-                        continue;
-                    }
-                    let from = wide(&self.positions[i]);
-                    let way = wide(&self.wanted[i]) - from;
-                    let held = if halved < HALVINGS {
-                        narrow(&(from + way * 0.5))
-                    } else {
-                        self.positions[i]
-                    };
-                    if self.wanted[i] != held {
-                        self.wanted[i] = held;
-                        self.altered.push(n);
-                        self.push_node(n);
-                        // What went the same way as it may now run into it.
-                        went_far = true;
-                    }
+                } else {
+                    // What went the same way as they did may now run into them.
+                    went_far |= self.hold_back(a, halved < HALVINGS);
                 }
             }
             self.actives = actives;
             if is_joined {
                 self.go_together();
                 went_far = true;
-            } else if unsafe_count > 0 && (HALVINGS..HALVINGS + JOININGS).contains(&halved) {
+            } else if unsafe_count > 0 && is_joining {
                 // Nothing more to join: what is not safe yet is held.
                 halved = HALVINGS + JOININGS;
                 went_far = true;
@@ -176,6 +159,39 @@ impl Contact {
         }
     }
 
+    /// Holds the nodes of a pair back: half the way, or all of it. Returns whether any went less far
+    /// than before.
+    fn hold_back(&mut self, a: &Active, is_half: bool) -> bool {
+        let mut any = false;
+        for n in a.nodes {
+            let i = n as usize;
+            if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
+                continue;
+            }
+            let from = wide(&self.positions[i]);
+            let way = wide(&self.wanted[i]) - from;
+            let held = if is_half {
+                narrow(&(from + way * 0.5))
+            } else {
+                self.positions[i]
+            };
+            any |= self.send(n, held);
+        }
+        any
+    }
+
+    /// Wants a node elsewhere. Returns whether that is new.
+    fn send(&mut self, node: u32, to: Point3<f32>) -> bool {
+        let i = node as usize;
+        if self.wanted[i] == to {
+            return false;
+        }
+        self.wanted[i] = to;
+        self.altered.push(node);
+        self.push_node(node);
+        true
+    }
+
     /// Lets the nodes of each zone go the same way.
     fn go_together(&mut self) {
         let mut ways: Vec<(u32, Vector3<f32>)> = Vec::new();
@@ -184,11 +200,8 @@ impl Contact {
         }
         for (node, way) in ways {
             let i = node as usize;
-            let to = self.positions[i] + way;
-            if self.wanted[i] != to && self.carried_by[i] == u32::MAX {
-                self.wanted[i] = to;
-                self.altered.push(node);
-                self.push_node(node);
+            if self.carried_by[i] == u32::MAX {
+                self.send(node, self.positions[i] + way);
             }
         }
     }

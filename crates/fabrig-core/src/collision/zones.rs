@@ -77,13 +77,8 @@ impl Zones {
         positions: &'a [Point3<f32>],
     ) -> impl Iterator<Item = (&'a [u32], Vector3<f32>)> {
         self.members.iter().filter(|m| !m.is_empty()).map(|nodes| {
-            let mut sum = Vector3::<f64>::zeros();
-            // In the order of nodes, not of joining.
-            let mut sorted = nodes.clone();
-            sorted.sort_unstable();
-            for &n in &sorted {
-                sum += (self.hoped[n as usize] - positions[n as usize]).cast();
-            }
+            let way = |&n: &u32| (self.hoped[n as usize] - positions[n as usize]).cast::<f64>();
+            let sum: Vector3<f64> = nodes.iter().map(way).sum();
             let mean = (sum / nodes.len() as f64).cast::<f32>();
             (nodes.as_slice(), mean.map(|x| (x / GRAIN).round() * GRAIN))
         })

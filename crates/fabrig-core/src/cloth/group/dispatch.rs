@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::descent::merge;
-use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Substep};
+use super::interface::{GroupFloor, GroupPairs, Monitor, PatchGroup, Span, Substep};
 use super::pairs::PairTable;
 use super::ports::{OwnPorts, Ports};
 use super::state::{FARTHEST, Group};
@@ -118,14 +118,8 @@ impl<R: Real> PatchGroup for Group<R> {
         self.solution[node].set_lane(lane, [0, 1, 2].map(|axis| x[axis] + by[axis]));
     }
 
-    fn straighten(
-        &mut self,
-        lane: usize,
-        node: usize,
-        from: Point3<f32>,
-        progress: [f64; 2],
-        [elapsed, h]: [f64; 2],
-    ) {
+    fn straighten(&mut self, lane: usize, node: usize, from: Point3<f32>, span: Span) {
+        let (Span { progress, h, .. }, elapsed) = (span, span.elapsed());
         let center = self.origin.lane(lane);
         let segment = |weights: [f64; 3]| {
             let weights = weights.map(R::splat);

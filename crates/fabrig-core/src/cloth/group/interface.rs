@@ -26,6 +26,24 @@ pub(crate) struct Substep {
     pub(crate) wind_horizon: Option<f64>,
 }
 
+/// What has gone by since a hook was called.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    /// Progress through the frame then and now, 0 to 1.
+    pub(crate) progress: [f64; 2],
+    /// Substeps since.
+    pub(crate) substeps: usize,
+    /// Duration of each of them. (s)
+    pub(crate) h: f64,
+}
+
+impl Span {
+    /// Time since then. (s)
+    pub(crate) fn elapsed(&self) -> f64 {
+        self.h * self.substeps as f64
+    }
+}
+
 /// The pairs of a group's nodes with nodes of other patches.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GroupPairs {
@@ -110,17 +128,8 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn shift(&mut self, lane: usize, node: usize, by: [f64; 3]);
     /// Lets a node that was shifted go on as if it had gone straight there against its target.
     ///
-    /// - `from`: where it began [mm, head frame]
-    /// - `progress`: through the frame then and now, 0 to 1
-    /// - `times`: since then, and of this substep (s)
-    fn straighten(
-        &mut self,
-        lane: usize,
-        node: usize,
-        from: Point3<f32>,
-        progress: [f64; 2],
-        times: [f64; 2],
-    );
+    /// - `from`: where it began the span [mm, head frame]
+    fn straighten(&mut self, lane: usize, node: usize, from: Point3<f32>, span: Span);
     /// Lets the monitor know that nodes of a patch were moved from outside by `squared`
     /// altogether (mm^2), and forgets its history where that `stopped` it.
     fn note_shifts(&mut self, lane: usize, squared: f64, stopped: bool);

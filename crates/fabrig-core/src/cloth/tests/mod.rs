@@ -5,5 +5,6 @@ mod analytic;
 mod determinism;
 mod equilibrium;
 mod hard_cases;
+mod hooks;
 mod support;
 mod variations;
