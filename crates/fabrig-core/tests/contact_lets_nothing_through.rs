@@ -14,7 +14,7 @@ use fabrig_core::collision::{Collider, ColliderFrame, ColliderShape, PairMask, S
 use fabrig_core::mesh::Surface;
 use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::scene::{Scene, Simulation};
-use fabrig_core::template::RigidBody;
+use fabrig_core::template::{self, RigidBody};
 use fabrig_core::{Point, Vector};
 use nalgebra::{Isometry3, Unit};
 
@@ -263,6 +263,34 @@ fn lips_and_cheeks_rest_on_teeth_and_gums() {
     let deepest = nodes.iter().copied().fold(0.0, f64::max);
     assert!(deepest < 0.1, "{} nodes, {deepest} mm", nodes.len());
     assert!(skin < 0.1, "{skin} mm of skin");
+}
+
+/// Every frame of the demo's story: lips that stick and peel, a finger and a ball, blinks.
+#[test]
+fn nothing_crosses_in_the_contact_story() {
+    let rig = &faces::demo().rig;
+    let options = ReadOptions::default();
+    let clip = motion::parse(template::demo_contact_take(), "story", &options).unwrap();
+    let colliders = template::demo_contact_colliders();
+    let text = format!("[contact]\npairs = \"all\"\nsticky_lips = {{}}\n{colliders}");
+    let scene = Scene::from_toml(&text).unwrap();
+    let frames = (clip.duration() * 60.0) as usize;
+    let mut simulation = Simulation::new(Arc::clone(rig), scene, Some(clip)).unwrap();
+    let mut forces = [0.0_f64; 2];
+    for frame in 0..frames {
+        let report = simulation.advance(1.0 / 60.0).unwrap();
+        let verdict = simulation.judge_contact().unwrap().unwrap();
+        let crossed = verdict.cloth + verdict.colliders;
+        assert_eq!(crossed, 0, "frame {frame}: {verdict:?}");
+        let skin = report.skin_contact.deepest_after;
+        assert!(skin < 0.05, "frame {frame}: {skin} mm of skin inside");
+        let contact = simulation.contact_report().unwrap();
+        assert_eq!(contact.pinched, 0, "frame {frame}");
+        for (most, force) in forces.iter_mut().zip(&contact.forces) {
+            *most = most.max(force.norm());
+        }
+    }
+    assert!(forces.iter().all(|f| *f > 0.0), "{forces:?}");
 }
 
 /// Every frame of the real take with everything that may touch, judged; minutes.

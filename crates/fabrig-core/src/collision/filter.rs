@@ -3,8 +3,9 @@
 //! After contacts are projected, every pair that could have met is followed along its straight
 //! way by conservative advancement: its distance can fall by no more than its nodes move
 //! against each other. A pair that would lose nine tenths of its distance is not safe. Its
-//! nodes are then held back: half the way, after some rounds a way that is the same for all of
-//! them ([`super::zones`]), and at last no way at all; where they stood nothing crossed. A
+//! nodes are then held back: from half of what they go against each other, so that what goes
+//! together goes on; after some rounds to a way that is the same for all of them
+//! ([`super::zones`]); and at last to no way at all, as where they stood nothing crossed. A
 //! collider cannot be held back, so nodes in front of it are carried along with it instead, and
 //! what they meet is carried too.
 //!
@@ -132,8 +133,9 @@ impl Contact {
                     // A pair without a collider has nodes of cloth alone.
                     is_joined |= self.zones.join(&a.nodes);
                 } else {
-                    // What went the same way as they did may now run into them.
-                    went_far |= self.hold_back(a, halved < HALVINGS);
+                    // What went the same way as they did may now run into them. A way of one
+                    // rounding has no half.
+                    went_far |= halved < HALVINGS && self.slow_down(a) || self.hold(a);
                 }
             }
             self.actives = actives;
@@ -159,25 +161,39 @@ impl Contact {
         }
     }
 
-    /// Holds the nodes of a pair back: half the way, or all of it. Returns whether any went less far
-    /// than before.
-    fn hold_back(&mut self, a: &Active, is_half: bool) -> bool {
+    /// Takes half off what the nodes of a pair go against each other, and leaves what they go
+    /// together. Returns whether that is any less than before.
+    fn slow_down(&mut self, a: &Active) -> bool {
+        let at = places(&a.nodes, &self.positions);
+        let to = places(&a.nodes, &self.wanted);
+        let mut mean = Vector::zeros();
+        for k in 0..4 {
+            mean += (to[k] - at[k]) * (0.5 * a.weights[k].abs());
+        }
         let mut any = false;
-        for n in a.nodes {
-            let i = n as usize;
-            if i >= self.cloth_count || self.carried_by[i] != u32::MAX {
-                continue;
+        for k in 0..4 {
+            if self.can_yield(a.nodes[k]) {
+                let half = at[k] + (to[k] - at[k] + mean) * 0.5;
+                any |= self.send(a.nodes[k], narrow(&half));
             }
-            let from = wide(&self.positions[i]);
-            let way = wide(&self.wanted[i]) - from;
-            let held = if is_half {
-                narrow(&(from + way * 0.5))
-            } else {
-                self.positions[i]
-            };
-            any |= self.send(n, held);
         }
         any
+    }
+
+    /// Holds the nodes of a pair where they are. Returns whether any was to go.
+    fn hold(&mut self, a: &Active) -> bool {
+        let mut any = false;
+        for node in a.nodes {
+            if self.can_yield(node) {
+                any |= self.send(node, self.positions[node as usize]);
+            }
+        }
+        any
+    }
+
+    /// Whether a node is of the cloth and no collider carries it.
+    fn can_yield(&self, node: u32) -> bool {
+        (node as usize) < self.cloth_count && self.carried_by[node as usize] == u32::MAX
     }
 
     /// Wants a node elsewhere. Returns whether that is new.
@@ -200,7 +216,7 @@ impl Contact {
         }
         for (node, way) in ways {
             let i = node as usize;
-            if self.carried_by[i] == u32::MAX {
+            if self.can_yield(node) {
                 self.send(node, self.positions[i] + way);
             }
         }
