@@ -140,7 +140,7 @@ impl<R: Real> pulp::NullaryFnOnce for Sweeps<'_, R> {
                 &g.lists.diagonals,
                 &mut g.positions,
                 &g.inv_masses,
-                &g.diagonal_lengths,
+                g.diagonal_lengths.part(0..g.lists.diagonals.len()),
                 half,
                 half,
             );
@@ -148,7 +148,7 @@ impl<R: Real> pulp::NullaryFnOnce for Sweeps<'_, R> {
                 &g.lists.edges,
                 &mut g.positions,
                 &g.inv_masses,
-                &g.edge_lengths,
+                g.edge_lengths.part(0..g.lists.edges.len()),
                 &g.resting,
                 half,
                 &stretch,

@@ -53,7 +53,7 @@ pub(crate) fn project_triple<R: Real>(
     s * -(part / (sum * part + bend.compliance * turned))
 }
 
-/// Projects every triple of a grid.
+/// Projects triples of a grid.
 ///
 /// - `displacements` (mm), `inv_masses` [1/mass]: one per node
 /// - `softness`: factor of each triple's compliance, not read without `IS_VARIED`

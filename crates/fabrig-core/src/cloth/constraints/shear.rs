@@ -6,7 +6,7 @@
 //!
 //! Source: Provot 1995, *Deformation constraints in a mass-spring model*, shear springs.
 
-use super::stretch::{RestLengths, edge_length};
+use super::stretch::{RestLengths, RestPart, edge_length};
 use crate::machine::{Real, Vec3};
 
 /// Projects one diagonal.
@@ -31,9 +31,10 @@ pub(crate) fn project_diagonal<R: Real>(
     (d * -(s * wa), d * (s * wb))
 }
 
-/// Projects every diagonal of a grid.
+/// Projects diagonals of a grid.
 ///
 /// - `positions` (mm), `inv_masses` [1/mass]: one per node
+/// - `rest`: one per diagonal
 /// - `progress`: how far through the frame, 0 to 1
 ///
 /// Without `IS_VARIED` the diagonals' softness is not read.
@@ -42,7 +43,7 @@ pub(crate) fn project_shear<R: Real, const IS_VARIED: bool>(
     diagonals: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
-    rest: &RestLengths<R>,
+    rest: RestPart<'_, R>,
     progress: R,
     compliance: R,
 ) {
@@ -55,7 +56,7 @@ pub(crate) fn project_shear<R: Real, const IS_VARIED: bool>(
             inv_masses[j],
             rest.at(diagonal, progress),
             if IS_VARIED {
-                compliance * rest.softness(diagonal)
+                compliance * rest.softness[diagonal]
             } else {
                 compliance
             },
@@ -120,11 +121,18 @@ mod tests {
             .map(|p| Vec3::splat([p[0] + 0.3 * p[1], p[1], 0.0]))
             .collect();
         let before = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
-        project_shear::<_, false>(&diagonals, &mut sheared, &[1.0; 4], &rest, 1.0, 0.0);
+        project_shear::<_, false>(
+            &diagonals,
+            &mut sheared,
+            &[1.0; 4],
+            rest.part(0..2),
+            1.0,
+            0.0,
+        );
         let after = shear_energy(&diagonals, &sheared, (&rest, 1.0), 2.0);
         assert!(after < 0.05 * before, "{before} -> {after}");
         let mut heap = vec![Vec3::<f64>::zero(); 4];
-        project_shear::<_, false>(&diagonals, &mut heap, &[1.0; 4], &rest, 1.0, 0.0);
+        project_shear::<_, false>(&diagonals, &mut heap, &[1.0; 4], rest.part(0..2), 1.0, 0.0);
         assert!(heap.iter().all(|p| p.dot(*p).is_finite()));
     }
 }

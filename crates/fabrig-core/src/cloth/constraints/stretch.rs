@@ -14,6 +14,8 @@
 //! Source: Macklin, Müller & Chentanez 2016, *XPBD*, eqs. 18 and 26, with no multiplier
 //! carried over, as there is one sweep per substep; separate compression as in nCloth.
 
+use std::ops::Range;
+
 use crate::machine::{Real, Vec3};
 
 /// Lengths below this are taken for this. (mm)
@@ -97,6 +99,37 @@ impl<R: Real> RestLengths<R> {
     pub(crate) fn at(&self, edge: usize, progress: R) -> R {
         self.start[edge] + progress * (self.end[edge] - self.start[edge])
     }
+
+    /// Those of some of the edges.
+    #[inline(always)]
+    pub(crate) fn part(&self, edges: Range<usize>) -> RestPart<'_, R> {
+        RestPart {
+            start: &self.start[edges.clone()],
+            end: &self.end[edges.clone()],
+            softness: if self.is_varied() {
+                &self.softness[edges]
+            } else {
+                &[]
+            },
+        }
+    }
+}
+
+/// [`RestLengths`] of successive edges.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RestPart<'a, R> {
+    start: &'a [R],
+    end: &'a [R],
+    /// Factor of each edge's compliance; empty where all are 1.
+    pub(crate) softness: &'a [R],
+}
+
+impl<R: Real> RestPart<'_, R> {
+    /// As [`RestLengths::at`].
+    #[inline(always)]
+    pub(crate) fn at(&self, edge: usize, progress: R) -> R {
+        self.start[edge] + progress * (self.end[edge] - self.start[edge])
+    }
 }
 
 /// Distance of two points by the very operations that the projection uses, so that an edge at
@@ -162,9 +195,10 @@ pub(crate) fn project_edge<R: Real>(
     (d * -(s * wa), d * (s * wb))
 }
 
-/// Projects every edge of a grid.
+/// Projects edges of a grid.
 ///
 /// - `positions`, `resting` (mm), `inv_masses` [1/mass]: one per node; see [`project_edge`]
+/// - `rest`: one per edge
 /// - `progress`: how far through the frame, 0 to 1
 ///
 /// Without `IS_DAMPED` the compliance's damping counts as zero, and `resting` is not read;
@@ -174,7 +208,7 @@ pub(crate) fn project_stretch<R: Real, const IS_DAMPED: bool, const IS_VARIED: b
     edges: &[[u32; 2]],
     positions: &mut [Vec3<R>],
     inv_masses: &[R],
-    rest: &RestLengths<R>,
+    rest: RestPart<'_, R>,
     resting: &[Vec3<R>],
     progress: R,
     compliance: &StretchCompliance<R>,

@@ -3,6 +3,7 @@
 use super::interface::Substep;
 use super::state::Group;
 use crate::cloth::constraints::bend::{BendCompliance, project_bend};
+use crate::cloth::constraints::grid_lists::Strip;
 use crate::cloth::constraints::pressure::{PadFaces, project_pressure};
 use crate::cloth::constraints::shear::project_shear;
 use crate::cloth::constraints::stretch::{StretchCompliance, project_stretch};
@@ -40,8 +41,8 @@ impl<R: Real> Group<R> {
         self.sweep_once(R::splat(substep.progress[1]), &compliance);
     }
 
-    /// Projects every constraint once, from displacements to positions. What has no stiffness in
-    /// any lane would move nothing and is left out.
+    /// Projects every constraint once, from displacements to positions, strip by strip. What has no
+    /// stiffness in any lane would move nothing and is left out.
     ///
     /// - `progress`: how far through the frame, 0 to 1
     #[inline(always)]
@@ -62,53 +63,69 @@ impl<R: Real> Group<R> {
                 &mut self.gradient,
             );
         }
-        if self.has_bend {
-            let bend = BendCompliance {
-                compliance: compliance.bend,
-                dropoff: self.bend_dropoff,
-                inv_edge_squared: self.inv_edge_squared,
-            };
-            let (triples, x) = (&self.lists.triples, &mut self.solution);
-            let (w, softness) = (&self.inv_masses, &self.bend_softness);
-            if is_varied {
-                project_bend::<R, true>(triples, x, w, &bend, softness);
-            } else {
-                project_bend::<R, false>(triples, x, w, &bend, softness);
+        for index in 0..self.lists.strips.len() {
+            let strip = self.lists.strips[index].clone();
+            if self.has_bend {
+                self.bend_strip(&strip, compliance.bend);
             }
-        }
-        for (x, target) in self.solution.iter_mut().zip(&self.targets) {
-            *x = *target + *x;
-        }
-        if self.has_shear {
-            let (diagonals, x) = (&self.lists.diagonals, &mut self.solution);
-            let (w, lengths) = (&self.inv_masses, &self.diagonal_lengths);
-            let shear = compliance.shear;
-            if is_varied {
-                project_shear::<R, true>(diagonals, x, w, lengths, progress, shear);
-            } else {
-                project_shear::<R, false>(diagonals, x, w, lengths, progress, shear);
+            let targets = &self.targets[strip.nodes.clone()];
+            for (x, target) in self.solution[strip.nodes.clone()].iter_mut().zip(targets) {
+                *x = *target + *x;
             }
-        }
-        if is_varied {
-            self.stretch_all::<true, true>(progress, &compliance.stretch);
-        } else if self.has_stretch_damping {
-            self.stretch_all::<true, false>(progress, &compliance.stretch);
-        } else {
-            self.stretch_all::<false, false>(progress, &compliance.stretch);
+            if self.has_shear {
+                self.shear_strip(&strip, progress, compliance.shear);
+            }
+            if is_varied {
+                self.stretch_strip::<true, true>(&strip, progress, &compliance.stretch);
+            } else if self.has_stretch_damping {
+                self.stretch_strip::<true, false>(&strip, progress, &compliance.stretch);
+            } else {
+                self.stretch_strip::<false, false>(&strip, progress, &compliance.stretch);
+            }
         }
     }
 
     #[inline(always)]
-    fn stretch_all<const IS_DAMPED: bool, const IS_VARIED: bool>(
+    fn bend_strip(&mut self, strip: &Strip, compliance: R) {
+        let bend = BendCompliance {
+            compliance,
+            dropoff: self.bend_dropoff,
+            inv_edge_squared: self.inv_edge_squared,
+        };
+        let triples = &self.lists.triples[strip.triples.clone()];
+        let (x, w) = (&mut self.solution, &self.inv_masses);
+        if self.edge_lengths.is_varied() {
+            let softness = &self.bend_softness[strip.triples.clone()];
+            project_bend::<R, true>(triples, x, w, &bend, softness);
+        } else {
+            project_bend::<R, false>(triples, x, w, &bend, &[]);
+        }
+    }
+
+    #[inline(always)]
+    fn shear_strip(&mut self, strip: &Strip, progress: R, compliance: R) {
+        let diagonals = &self.lists.diagonals[strip.diagonals.clone()];
+        let (x, w) = (&mut self.solution, &self.inv_masses);
+        let lengths = self.diagonal_lengths.part(strip.diagonals.clone());
+        if self.edge_lengths.is_varied() {
+            project_shear::<R, true>(diagonals, x, w, lengths, progress, compliance);
+        } else {
+            project_shear::<R, false>(diagonals, x, w, lengths, progress, compliance);
+        }
+    }
+
+    #[inline(always)]
+    fn stretch_strip<const IS_DAMPED: bool, const IS_VARIED: bool>(
         &mut self,
+        strip: &Strip,
         progress: R,
         compliance: &StretchCompliance<R>,
     ) {
         project_stretch::<R, IS_DAMPED, IS_VARIED>(
-            &self.lists.edges,
+            &self.lists.edges[strip.edges.clone()],
             &mut self.solution,
             &self.inv_masses,
-            &self.edge_lengths,
+            self.edge_lengths.part(strip.edges.clone()),
             &self.resting,
             progress,
             compliance,
