@@ -138,6 +138,9 @@ pub(crate) struct BenchRuntimeArgs {
     /// Frames of each measurement
     #[arg(long, default_value_t = 120, value_parser = clap::value_parser!(u32).range(10..=100_000))]
     pub(crate) frames: u32,
+    /// A take for the complex face instead of the bundled one, all of it
+    #[arg(long, value_name = "TAKE")]
+    pub(crate) motion: Option<PathBuf>,
     /// Print as JSON
     #[arg(long)]
     pub(crate) json: bool,

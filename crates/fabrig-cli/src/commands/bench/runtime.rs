@@ -1,6 +1,7 @@
 //! `fabrig bench runtime`: what a frame costs, and how the cost grows with the cloth.
 
 use anyhow::Result;
+use fabrig_core::motion::{self, ReadOptions};
 use fabrig_core::pipeline::{RuntimeReport, TimeStatistics, runtime};
 
 use super::demo_scene;
@@ -11,7 +12,11 @@ use crate::console::Console;
 pub(crate) fn run(console: &Console, args: &BenchRuntimeArgs) -> Result<Outcome> {
     let rig = demo_scene::demo_rig(console)?;
     let frames = args.frames as usize;
-    let report = runtime(&rig, &demo_scene::take()?, frames, &mut |at| {
+    let complex = match &args.motion {
+        Some(path) => motion::read(path, &ReadOptions::default())?,
+        None => demo_scene::take()?,
+    };
+    let report = runtime(&rig, &complex, frames, &mut |at| {
         console.show("simulating", at.frame, at.frame_count, &at.what)
     })?;
     console.clear();
