@@ -20,14 +20,48 @@ use super::plane::approach;
 use super::project::{Active, narrow};
 use crate::Vector;
 
-/// Rounds in which ways are halved, before nodes go together.
-const HALVINGS: usize = 6;
-/// Rounds in which they do, before they are held.
-const JOININGS: usize = 12;
+/// Times that pairs are looked for while ways are halved, before nodes go together.
+const HALVINGS: usize = 3;
+/// Times that they are while nodes do, before they are held.
+const JOININGS: usize = 6;
+/// Rounds over known pairs, before others are looked for.
+const ROUNDS: usize = 8;
 /// Share of its distance that a pair keeps in a pass.
 const KEPT: f64 = 0.1;
 /// Pairs nearer than this come no nearer: stored positions are not finer. (mm)
 const NEAREST: f64 = 5e-5;
+
+/// How nodes of unsafe pairs are held back.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    /// From half of what they go against each other.
+    SlowDown,
+    /// To a way that all of their zone go.
+    Join,
+    /// To no way at all.
+    Hold,
+}
+
+impl Stage {
+    /// The stage after pairs were looked for `count` times.
+    fn after(count: usize) -> Self {
+        if count < HALVINGS {
+            Self::SlowDown
+        } else if count < HALVINGS + JOININGS {
+            Self::Join
+        } else {
+            Self::Hold
+        }
+    }
+}
+
+/// What a round over the known pairs came to.
+#[derive(Debug, Default)]
+struct Round {
+    unsafe_count: usize,
+    /// Whether any node is wanted elsewhere than before.
+    is_changed: bool,
+}
 
 impl Contact {
     /// One pass: from `positions` to `wanted`, or as far as that is safe.
@@ -91,9 +125,13 @@ impl Contact {
         went_far
     }
 
+    /// Holds back and carries until no pair is unsafe.
+    ///
+    /// The pairs that are known are made safe, then those that may meet now are looked for:
+    /// looking costs much more than holding back, and finds little.
     fn make_safe(&mut self, mut went_far: bool) {
-        let (mut halved, mut has_zones) = (0, false);
-        loop {
+        let mut has_zones = false;
+        for stage in (0..).map(Stage::after) {
             if went_far {
                 // What was pushed may now meet what was not looked at.
                 let pushes: Vec<Active> = self
@@ -105,53 +143,16 @@ impl Contact {
                 self.follow();
                 self.collect_pushed();
                 self.remember(pushes);
-                went_far = false;
             }
+            went_far = false;
             let mut unsafe_count = 0;
-            let is_joining = (HALVINGS..HALVINGS + JOININGS).contains(&halved);
-            let mut is_joined = false;
-            let actives = std::mem::take(&mut self.actives);
-            for a in &actives {
-                if self.is_safe(a) {
-                    continue;
+            for _ in 0..ROUNDS {
+                let round = self.hold_back(stage, &mut has_zones);
+                unsafe_count = round.unsafe_count;
+                went_far |= round.is_changed;
+                if !round.is_changed {
+                    break;
                 }
-                unsafe_count += 1;
-                if let Some(c) = self.carrier(a) {
-                    if self.carry(a, c) {
-                        went_far = true;
-                        continue;
-                    }
-                    if self.lists[a.list as usize].collider.is_some() {
-                        continue;
-                    }
-                }
-                self.report.held += 1;
-                if !std::mem::replace(&mut has_zones, true) {
-                    self.zones.begin(&self.wanted[..self.cloth_count]);
-                }
-                if is_joining {
-                    // A pair without a collider has nodes of cloth alone.
-                    is_joined |= self.zones.join(&a.nodes);
-                } else {
-                    // What went the same way as they did may now run into them. A way of one
-                    // rounding has no half.
-                    went_far |= halved < HALVINGS && self.slow_down(a) || self.hold(a);
-                }
-            }
-            self.actives = actives;
-            if is_joined {
-                self.go_together();
-                went_far = true;
-            } else if unsafe_count > 0 && is_joining {
-                // Nothing more to join: what is not safe yet is held.
-                halved = HALVINGS + JOININGS;
-                went_far = true;
-            }
-            halved += 1;
-            if self.carry_out_of_round() {
-                went_far = true;
-            } else if unsafe_count == 0 {
-                return;
             }
             if !went_far {
                 // All their nodes are held or carried: caught between colliders.
@@ -159,6 +160,50 @@ impl Contact {
                 return;
             }
         }
+    }
+
+    /// Holds back or carries the nodes of every known pair that is unsafe.
+    fn hold_back(&mut self, stage: Stage, has_zones: &mut bool) -> Round {
+        let mut round = Round::default();
+        let mut is_joined = false;
+        let actives = std::mem::take(&mut self.actives);
+        for a in &actives {
+            if self.is_safe(a) {
+                continue;
+            }
+            round.unsafe_count += 1;
+            if let Some(c) = self.carrier(a) {
+                if self.carry(a, c) {
+                    round.is_changed = true;
+                    continue;
+                }
+                if self.lists[a.list as usize].collider.is_some() {
+                    continue;
+                }
+            }
+            self.report.held += 1;
+            if !std::mem::replace(has_zones, true) {
+                self.zones.begin(&self.wanted[..self.cloth_count]);
+            }
+            // What went the same way as they did may now run into them.
+            round.is_changed |= match stage {
+                // A way of one rounding has no half.
+                Stage::SlowDown => self.slow_down(a) || self.hold(a),
+                // A pair without a collider has nodes of cloth alone.
+                Stage::Join if self.zones.join(&a.nodes) => {
+                    is_joined = true;
+                    true
+                }
+                // Nothing more to join.
+                Stage::Join | Stage::Hold => self.hold(a),
+            };
+        }
+        self.actives = actives;
+        if is_joined {
+            self.go_together();
+        }
+        round.is_changed |= self.carry_out_of_round();
+        round
     }
 
     /// Takes half off what the nodes of a pair go against each other, and leaves what they go
