@@ -1,5 +1,6 @@
 //! From patches to groups: who shares a register, and who is paired with whom.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::group::{FloorNode, Group, GroupFloor, GroupPairs, Partner, PatchGroup, Ports};
@@ -50,7 +51,8 @@ pub(super) fn assemble(patches: &[ClothPatch], options: &ClothOptions) -> Assemb
 }
 
 /// Patches of one shape, with or without pressure, in chunks that fit into lanes; from the top
-/// down, so that what moves together sleeps together.
+/// down, so that what moves together sleeps together. The groups that take longest come first:
+/// threads that are done early find small ones left.
 fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> {
     let widest = match precision {
         Precision::Single => F32x8::LANES,
@@ -71,16 +73,17 @@ fn plan_groups(patches: &[ClothPatch], precision: Precision) -> Vec<Vec<usize>> 
         let rest = &patches[patch].rest;
         rest.iter().map(|p| f64::from(p.y)).sum::<f64>() / rest.len().max(1) as f64
     };
-    alike
-        .into_values()
-        .flat_map(|mut members| {
-            members.sort_by(|a, b| height(b).total_cmp(&height(a)));
-            members
-                .chunks(widest)
-                .map(<[usize]>::to_vec)
-                .collect::<Vec<_>>()
-        })
-        .collect()
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for mut members in alike.into_values() {
+        members.sort_by(|a, b| height(b).total_cmp(&height(a)));
+        groups.extend(members.chunks(widest).map(<[usize]>::to_vec));
+    }
+    // However many of its lanes are used.
+    groups.sort_by_key(|members| {
+        let patch = &patches[members[0]];
+        Reverse((patch.shape.node_count(), patch.material.pressure > 0.0))
+    });
+    groups
 }
 
 fn make_group(

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::assembly::PatchLayout;
-use super::group::{PatchGroup, Ports, Span, Substep};
+use super::group::{PatchGroup, Ports, Span, Substep, each_group};
 use super::hook::{HookSubstep, SubstepHook};
 
 /// Where the nodes that a hook sees come from.
@@ -58,8 +58,7 @@ pub(super) fn advance_hooked(
     let mut nodes = vec![Point3::origin(); seen.starts[seen.patches.len()]];
     let mut is_seen = vec![false; groups.len()];
     seen.patches.iter().for_each(|at| is_seen[at.group] = true);
-    groups
-        .par_iter_mut()
+    each_group(groups)
         .zip(now.split())
         .for_each(|(g, p)| g.predict(first, p));
     // Calls are spread evenly over the frame.
@@ -69,16 +68,13 @@ pub(super) fn advance_hooked(
     for (k, substep) in substeps.iter().enumerate() {
         let is_called = !seen.patches.is_empty() && (k + 1) * calls / count > k * calls / count;
         let shared: &Ports = now;
-        groups
-            .par_iter_mut()
-            .zip(&is_seen)
-            .for_each(|(g, is_seen)| {
-                g.solve(substep, shared);
-                g.set_hooked(is_called && *is_seen);
-                if is_called && *is_seen {
-                    g.hold_back();
-                }
-            });
+        each_group(groups).zip(&is_seen).for_each(|(g, is_seen)| {
+            g.solve(substep, shared);
+            g.set_hooked(is_called && *is_seen);
+            if is_called && *is_seen {
+                g.hold_back();
+            }
+        });
         if is_called {
             seen.gather(groups, &mut nodes);
             let span = Span {
@@ -90,8 +86,7 @@ pub(super) fn advance_hooked(
             call(groups, &seen, &nodes, span, hook);
         }
         let following = substeps.get(k + 1);
-        groups
-            .par_iter_mut()
+        each_group(groups)
             .zip(next.split())
             .for_each(|(g, p)| match following {
                 Some(following) => g.turn(following, p),

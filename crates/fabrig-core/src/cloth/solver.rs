@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::assembly::{Assembly, PatchLayout, assemble};
 use super::error::ClothError;
-use super::group::{Monitor, OwnPorts, PatchGroup, Ports, Substep};
+use super::group::{Monitor, OwnPorts, PatchGroup, Ports, Substep, each_group};
 use super::guard::Guard;
 use super::hook::SubstepHook;
 use super::hooked::{SeenNodes, advance_hooked};
@@ -237,9 +237,7 @@ impl Cloth {
         let (dt, targets, anchors) = (input.dt, input.targets, input.anchors);
         let (monitors, asleep) = (&mut self.monitors, &self.asleep);
         if let Some(hook) = hook {
-            self.groups
-                .par_iter_mut()
-                .for_each(|g| g.begin_frame(dt, targets, anchors));
+            each_group(&mut self.groups).for_each(|g| g.begin_frame(dt, targets, anchors));
             advance_hooked(
                 &mut self.groups,
                 &mut self.ports,
@@ -247,23 +245,20 @@ impl Cloth {
                 &self.layout,
                 hook,
             );
-            self.groups
-                .par_iter_mut()
+            each_group(&mut self.groups)
                 .zip(monitors)
                 .for_each(|(g, m)| g.end_frame(m));
         } else if !self.ports[0].is_empty() {
             awake(&mut self.groups, asleep).for_each(|g| g.begin_frame(dt, targets, anchors));
             advance_together(&mut self.groups, &mut self.ports, &substeps, asleep);
-            self.groups
-                .par_iter_mut()
+            each_group(&mut self.groups)
                 .zip(monitors)
                 .zip(asleep)
                 .filter(|(_, asleep)| !**asleep)
                 .for_each(|((g, m), _)| g.end_frame(m));
         } else {
             let none = Ports::default();
-            self.groups
-                .par_iter_mut()
+            each_group(&mut self.groups)
                 .zip(monitors)
                 .zip(asleep)
                 .filter(|(_, asleep)| !**asleep)
@@ -470,8 +465,7 @@ fn awake<'a>(
     groups: &'a mut [Box<dyn PatchGroup>],
     asleep: &'a [bool],
 ) -> impl ParallelIterator<Item = &'a mut Box<dyn PatchGroup>> {
-    groups
-        .par_iter_mut()
+    each_group(groups)
         .zip(asleep)
         .filter(|(_, asleep)| !**asleep)
         .map(|(group, _)| group)
@@ -488,8 +482,7 @@ fn advance_together(
     let Some(first) = substeps.first() else {
         return;
     };
-    groups
-        .par_iter_mut()
+    each_group(groups)
         .zip(now.split())
         .zip(asleep)
         .filter(|(_, asleep)| !**asleep)
@@ -497,8 +490,7 @@ fn advance_together(
     for (k, substep) in substeps.iter().enumerate() {
         let following = substeps.get(k + 1);
         let shared: &Ports = now;
-        groups
-            .par_iter_mut()
+        each_group(groups)
             .zip(next.split())
             .zip(asleep)
             .filter(|(_, asleep)| !**asleep)

@@ -48,7 +48,7 @@ pub use own_shapes::{OwnShapes, OwnShapesError, neutral_of_shapes, read_own_shap
 pub use own_template::{OwnTemplate, OwnTemplateOptions, template_from_face};
 pub use patch_detail::{PatchDetail, PatchDetailError, ResolutionRow, resolution_rows};
 pub use rig_face::{CutOrigins, RigFaceOptions, RiggedFace, rig_face};
-pub use runtime::{FaceRow, RuntimeProgress, RuntimeReport, SizeRow, runtime};
+pub use runtime::{FaceRow, Growth, RuntimeProgress, RuntimeReport, SizeRow, runtime};
 pub use stage::{
     StageReport, StagedFace, animate_scene, edits_of, load_faces, scene_duration, scene_rate,
 };

@@ -71,6 +71,10 @@ pub struct FaceRow {
 pub struct SizeRow {
     /// Nodes of all patches.
     pub nodes: usize,
+    /// Whether patches are attached to each other. Then all of them are at the same substep, and
+    /// the state of all goes through the caches in each; otherwise some of them go through all
+    /// substeps of a frame at once.
+    pub is_attached: bool,
     /// Threads that took part.
     pub threads: usize,
     /// Time of a frame. (ms)
@@ -79,6 +83,17 @@ pub struct SizeRow {
     pub least_ms: f64,
     /// Of the quickest frame.
     pub microseconds_per_node: f64,
+}
+
+/// How the cost of the cloth grows with its size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Growth {
+    /// As in the rows that it is of.
+    pub is_attached: bool,
+    /// Threads that took part.
+    pub threads: usize,
+    /// Largest over least time per node.
+    pub ratio: f64,
 }
 
 /// What frames cost.
@@ -94,8 +109,8 @@ pub struct RuntimeReport {
     pub faces: Vec<FaceRow>,
     /// The cloth alone.
     pub sizes: Vec<SizeRow>,
-    /// Largest over least time per node, by thread count.
-    pub growth: Vec<(usize, f64)>,
+    /// Of the cloth alone, over its sizes.
+    pub growth: Vec<Growth>,
 }
 
 /// How far a measurement has come.
@@ -171,35 +186,42 @@ pub fn runtime(
                 report.faces.push(row);
             }
         }
-        for scale in SCALES {
-            let scene = BenchScene::sized(scale, true, frames);
-            let nodes = scene.node_count();
-            let now = RuntimeProgress {
-                what: format!("{nodes} nodes, {threads} threads"),
-                frame: 0,
-                frame_count: frames as u64,
-            };
-            if progress(now).is_break() {
-                return Ok(report);
+        for is_attached in [true, false] {
+            let mut cheapest_and_dearest = (f64::INFINITY, 0.0_f64);
+            for scale in SCALES {
+                let scene = BenchScene::sized(scale, is_attached, frames);
+                let nodes = scene.node_count();
+                let now = RuntimeProgress {
+                    what: format!("{nodes} nodes, {threads} threads"),
+                    frame: 0,
+                    frame_count: frames as u64,
+                };
+                if progress(now).is_break() {
+                    return Ok(report);
+                }
+                let result =
+                    pool.install(|| run(&scene, &ClothOptions::default(), scene.frames.len(), 0))?;
+                let least_ms = result.quantile_ms(0.0);
+                let microseconds_per_node = least_ms * 1e3 / nodes as f64;
+                let (cheapest, dearest) = &mut cheapest_and_dearest;
+                *cheapest = cheapest.min(microseconds_per_node);
+                *dearest = dearest.max(microseconds_per_node);
+                report.sizes.push(SizeRow {
+                    nodes,
+                    is_attached,
+                    threads,
+                    microseconds_per_node,
+                    frame: TimeStatistics::of(result.frame_ms),
+                    least_ms,
+                });
             }
-            let result =
-                pool.install(|| run(&scene, &ClothOptions::default(), scene.frames.len(), 0))?;
-            let least_ms = result.quantile_ms(0.0);
-            report.sizes.push(SizeRow {
-                nodes,
+            let (cheapest, dearest) = cheapest_and_dearest;
+            report.growth.push(Growth {
+                is_attached,
                 threads,
-                microseconds_per_node: least_ms * 1e3 / nodes as f64,
-                frame: TimeStatistics::of(result.frame_ms),
-                least_ms,
+                ratio: dearest / cheapest,
             });
         }
-        let rows = report.sizes.iter().filter(|row| row.threads == threads);
-        let (least, most) = rows
-            .map(|row| row.microseconds_per_node)
-            .fold((f64::INFINITY, 0.0_f64), |(low, high), x| {
-                (low.min(x), high.max(x))
-            });
-        report.growth.push((threads, most / least));
     }
     report.is_complete = true;
     Ok(report)

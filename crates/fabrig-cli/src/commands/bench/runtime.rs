@@ -69,25 +69,34 @@ fn print(console: &Console, report: &RuntimeReport) {
         report.paper_fps.map(|fps| fps.to_string()).join(", ")
     ));
     console.result(
-        "the cloth alone, with pairs and a shaking head; time per node of the quickest frame:",
+        "the cloth alone under a shaking head, patches attached to each other or not; time per node \
+         of the quickest frame:",
     );
     console.result(&format!(
-        "{:>8}{:>9}  {:<26}{:>9}{:>12}",
-        "nodes", "threads", "frame [ms]", "least", "us per node"
+        "{:>8}{:>10}{:>9}  {:<26}{:>9}{:>12}",
+        "nodes", "attached", "threads", "frame [ms]", "least", "us per node"
     ));
     for row in &report.sizes {
         console.result(&format!(
-            "{:>8}{:>9}  {:<26}{:>9.3}{:>12.4}",
+            "{:>8}{:>10}{:>9}  {:<26}{:>9.3}{:>12.4}",
             row.nodes,
+            if row.is_attached { "yes" } else { "no" },
             row.threads,
             times(&row.frame),
             row.least_ms,
             row.microseconds_per_node
         ));
     }
-    for (threads, growth) in &report.growth {
+    for growth in &report.growth {
         console.result(&format!(
-            "{threads} threads: the dearest node costs {growth:.2} times the cheapest"
+            "{} threads, {}: the dearest node costs {:.2} times the cheapest",
+            growth.threads,
+            if growth.is_attached {
+                "attached"
+            } else {
+                "unattached"
+            },
+            growth.ratio
         ));
     }
 }

@@ -120,16 +120,17 @@ pub fn settings(is_full: bool) -> Vec<Setting> {
     };
     let of_mode = |mode| Setting { mode, ..base };
     let all: &[u32] = &[1, 2, 3, 4, 6, 8, 9, 10, 12, 16, 32, 64, 128];
+    let up_to = |most| &all[..all.partition_point(|&substeps| substeps <= most)];
     let lines: Vec<(Setting, &[u32])> = if is_full {
         vec![
             (base, all),
             (euler, all),
             (with_sweeps(2), all),
-            (with_sweeps(3), &all[..10]),
-            (with_sweeps(4), &all[..10]),
+            (with_sweeps(3), up_to(16)),
+            (with_sweeps(4), up_to(16)),
             (double, all),
-            (of_mode(Mode::Robust), &all[..11]),
-            (of_mode(Mode::Paper), &all[..11]),
+            (of_mode(Mode::Robust), up_to(32)),
+            (of_mode(Mode::Paper), up_to(32)),
         ]
     } else {
         vec![

@@ -97,7 +97,7 @@ impl<R: Real> RestLengths<R> {
     /// Rest length at `progress` (0 to 1) through the frame.
     #[inline(always)]
     pub(crate) fn at(&self, edge: usize, progress: R) -> R {
-        self.start[edge] + progress * (self.end[edge] - self.start[edge])
+        between(self.start[edge], self.end[edge], progress)
     }
 
     /// Those of some of the edges.
@@ -128,8 +128,14 @@ impl<R: Real> RestPart<'_, R> {
     /// As [`RestLengths::at`].
     #[inline(always)]
     pub(crate) fn at(&self, edge: usize, progress: R) -> R {
-        self.start[edge] + progress * (self.end[edge] - self.start[edge])
+        between(self.start[edge], self.end[edge], progress)
     }
+}
+
+/// A rest length on its way through a frame.
+#[inline(always)]
+fn between<R: Real>(start: R, end: R, progress: R) -> R {
+    start + progress * (end - start)
 }
 
 /// Distance of two points by the very operations that the projection uses, so that an edge at

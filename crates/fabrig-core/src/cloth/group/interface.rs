@@ -1,6 +1,7 @@
 //! What the solver sees of a group, whatever its lane type.
 
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use super::ports::{OwnPorts, Ports};
 use crate::cloth::input::PatchMotion;
@@ -160,4 +161,11 @@ pub(crate) trait PatchGroup: Send + Sync {
     fn write_positions(&self, lane: usize, positions: &mut [Point3<f32>]);
     /// Position and velocity of one node in full precision. [mm, mm/s]
     fn node_state(&self, lane: usize, node: usize) -> ([f64; 3], [f64; 3]);
+}
+
+/// All groups in parallel. They are few and unlike, so each is a piece of work of its own.
+pub(crate) fn each_group(
+    groups: &mut [Box<dyn PatchGroup>],
+) -> impl IndexedParallelIterator<Item = &mut Box<dyn PatchGroup>> {
+    groups.par_iter_mut().with_max_len(1)
 }

@@ -18,7 +18,7 @@ mod substep;
 mod sweeps;
 
 pub(crate) use interface::{
-    FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Span, Substep,
+    FloorNode, GroupFloor, GroupPairs, Monitor, Partner, PatchGroup, Span, Substep, each_group,
 };
 pub(crate) use ports::{OwnPorts, Ports};
 pub(crate) use state::Group;
