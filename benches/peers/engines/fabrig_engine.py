@@ -40,7 +40,7 @@ class Engine:
         return 1e-3 * np.concatenate([p.reshape(-1, 3) for p in self.cloth.positions])
 
 
-def patches(scene, substeps):
+def patches(scene, substeps, **options):
     """The muscle material without shear."""
     material = {
         "mass": 1.0,
@@ -53,7 +53,12 @@ def patches(scene, substeps):
         "magnet_frequency_hz": np.sqrt(scenes.MAGNET) / (2 * np.pi),
         "magnet_damping_ratio": 0.0,
     }
-    return Engine(scene, substeps, material=material)
+    return Engine(scene, substeps, material=material, **options)
+
+
+def patches_double(scene, substeps):
+    """The same in double precision, for the strain that short steps come to."""
+    return patches(scene, substeps, precision="double")
 
 
 def hanging(scene, substeps):
